@@ -78,7 +78,8 @@ bench-machines: $(READY)  ## figures of the shipped machines, how well power-on 
 	mkdir -p out && $(BIN)/python examples/14_machines.py --out out/machines.png
 	$(BIN)/python examples/15_from_crate_to_first_cut.py
 	$(BIN)/python examples/16_a_sixth_leg.py --tries 200
-	$(BIN)/python examples/17_a_revolute_leg.py --seconds 20
+	$(BIN)/python examples/17_passive_joints.py --machine spr --seconds 20
+	$(BIN)/python examples/17_passive_joints.py --machine prpu --seconds 20
 	$(BIN)/python benchmarks/as_built.py
 
 reference: $(READY)  ## the pages of docs/reference, from the code

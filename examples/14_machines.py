@@ -36,11 +36,10 @@ def draw(axis: Any, machine: Machine, first: int, second: int) -> None:
     robot, work = machine.robot, machine.work
     i = np.array([0.0, 0.0, 1.0])
     for (p, line), style in (((work.centre - machine.tool_length * i, i), "-"), (worst_pose(machine), "--")):
-        joints = robot.platform_joints(p, line)
-        for leg, (foot, joint) in enumerate(zip(robot.base_joints, joints, strict=True)):
+        for leg, (foot, joint) in enumerate(zip(*machine.bars.ends(p, line), strict=True)):
             ends = 1e3 * np.stack([foot, joint])
             axis.plot(ends[:, first], ends[:, second], style, color=f"C{leg}", linewidth=1.2 if style == "-" else 0.7)
-        tool = 1e3 * np.stack([p + robot.offsets.min() * line, p + machine.tool_length * line])
+        tool = 1e3 * np.stack([p + machine.line_top * line, p + machine.tool_length * line])
         axis.plot(tool[:, first], tool[:, second], style, color="black", linewidth=2.0 if style == "-" else 1.0)
     feet, centre, r = 1e3 * robot.base_joints, 1e3 * work.centre, 500.0 * work.diameter
     axis.plot(feet[:, first], feet[:, second], "ks", markersize=4)

@@ -38,14 +38,14 @@ def test_motion_at_the_time_of_a_row_has_its_legs(opened):
     assert motion.pose(1e9)[0] == pytest.approx(motion.tips[-1]), "after the end it stands"
 
 
-@pytest.mark.parametrize("name", ["desk", "hexa", "spr"])
+@pytest.mark.parametrize("name", ["desk", "hexa", "spr", "prpu"])
 def test_arms_lead_from_the_axis_to_the_joints_beside_it(name):
     machine = Machine.load(name)
     tip, axis = machine.work.centre, np.array([0.0, 0.6, -0.8])
     _, joints = leg_ends(machine, tip, axis)
     beside, heights = arms_beside(machine)
     arms = joints[beside] - tip - heights[:, None] * axis
-    assert beside.tolist() == {"desk": [], "hexa": [5], "spr": [0, 1, 2, 3]}[name]
+    assert beside.tolist() == {"desk": [], "hexa": [5], "spr": [0, 1, 2, 3], "prpu": [0, 1, 2, 3, 4]}[name]
     np.testing.assert_allclose(arms @ axis, 0.0, atol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(arms, axis=1), machine.robot.arms[beside])
 

@@ -14,8 +14,9 @@ from pentapod.base.tables import TomlTable, wrong
 from pentapod.base.values import Value
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.fields import LEG_NUMBERS, LEG_PAIRS, LEGS
+from pentapod.machine.passive_limb import PassiveLimb
 
-QUADRATIC, GENERAL, PENTAKINS, HEXA, SPR = "quadratic", "general", "pentakins", "hexa", "4-ups-spr"
+QUADRATIC, GENERAL, PENTAKINS, HEXA, SPR, PRPU = "quadratic", "general", "pentakins", "hexa", "4-ups-spr", "5-ups-prpu"
 
 
 class GeometryTable(TomlTable):
@@ -23,7 +24,7 @@ class GeometryTable(TomlTable):
 
     family: str = Field(
         default=QUADRATIC,
-        description="robot family: quadratic, general, pentakins, hexa or 4-ups-spr; packages can add others",
+        description="robot family: quadratic, general, pentakins, hexa, 4-ups-spr or 5-ups-prpu; packages add others",
     )
     base_mm: LEG_PAIRS = Field(description="base joints [x, y] in the base plane z = 0, leg by leg")
     delta: float | None = Field(default=None, description="platform joint i is at delta · x_i along the tool axis")
@@ -38,12 +39,13 @@ class Family(Value):
 
     robot: table [geometry] → robot; `table.si` has the table's values in SI units. Raises MachineError where they make
     no robot. table: a subclass of `GeometryTable`, where the family has further keys. n_legs: lists with a value for
-    each leg have so many.
+    each leg have so many. limb: table [geometry] → passive limb, where the robot has one.
     """
 
     robot: Callable[[Any], Robot]
     table: type[GeometryTable] = GeometryTable
     n_legs: int = LEGS
+    limb: Callable[[Any], PassiveLimb] | None = None
 
 
 FAMILIES = Registry(
@@ -57,6 +59,7 @@ FAMILIES = Registry(
         PENTAKINS: "pentapod.machine.robots.pentakins",
         HEXA: "pentapod.machine.robots.hexa",
         SPR: "pentapod.machine.robots.spr",
+        PRPU: "pentapod.machine.robots.prpu",
     },
     constant="FAMILY",
 )

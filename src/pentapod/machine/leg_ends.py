@@ -28,9 +28,21 @@ def arms_beside(machine: Machine) -> tuple[Ints, Floats]:
     return legs, machine.tool_length - robot.offsets[legs]
 
 
+def strut_ends(machine: Machine, tip: Floats, axis: Floats) -> Floats:
+    """Return both ends of the passive limb's strut, (1, 2, 3), metres; (0, 2, 3) where there is none."""
+    if machine.limb is None:
+        return np.zeros((0, 2, 3))
+    return np.stack(machine.limb.ends(tip + machine.tool_length * axis, -axis))[None]
+
+
+def rails(machine: Machine) -> Floats:
+    """Return both ends of the passive limb's rail, (1, 2, 3), metres; (0, 2, 3) where there is none."""
+    return np.zeros((0, 2, 3)) if machine.limb is None else machine.limb.rail_ends()[None]
+
+
 def line_top(machine: Machine, tip: Floats, axis: Floats) -> Floats:
     """Return the far end (3,) of the platform line: the platform joint farthest from the tip, metres."""
-    return tip + (machine.tool_length - float(machine.robot.offsets.min())) * axis
+    return tip + (machine.tool_length - machine.line_top) * axis
 
 
 def base_rim(machine: Machine, count: int) -> Floats:

@@ -18,12 +18,14 @@ from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.kinematics.robot import Robot
 from pentapod.machine import reader
+from pentapod.machine.bars import Bars
 from pentapod.machine.calibration.digest import digest_of
 from pentapod.machine.calibration.record import CalibrationRecord
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.fields import for_legs, positive
 from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
+from pentapod.machine.passive_limb import PassiveLimb
 
 ARCHITECTURAL_LIMIT = 0.005
 """Least `conditioning` of a machine's robot: below it, some motion hardly changes the leg lengths."""
@@ -38,6 +40,7 @@ class Machine(Value):
     them. guides: of a reconfigurable machine, on which the base joints are set before a program runs; rail_positions
     (n_legs,) metres: where they stand; `robot` is the geometry there. calibration: from which `robot` is the machine as
     built; None where it is the one that was designed. leg_model: from readings to what drives are told, in posts.
+    limb: the passive limb that holds the platform, where one does.
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
     spindle's nose would be above the lowest platform joint.
@@ -60,6 +63,7 @@ class Machine(Value):
     guides: ReconfigurablePentapod | None = None
     calibration: CalibrationRecord | None = None
     leg_model: LegModel = field(default_factory=LegModel)
+    limb: PassiveLimb | None = None
     rail_positions: Floats = field(default_factory=lambda: np.zeros(1))
     architecture: float = field(init=False)
 
@@ -83,7 +87,7 @@ class Machine(Value):
                 expected=f"a reciprocal condition number of at least {ARCHITECTURAL_LIMIT:g}",
                 remedy="spread the base joints: no four near one line, no x or y shared by many",
             )
-        room = self.tool_length - float(self.robot.offsets.max()) - self.bodies.shaft_end
+        room = self.tool_length - float(self.bars.offsets.max()) - self.bodies.shaft_end
         if room < 0.0:
             raise MachineError(
                 f"the tool is {-room * 1e3:.4g} mm too short: the spindle would end above a platform joint",
@@ -127,6 +131,16 @@ class Machine(Value):
         Name, drives and masses do not count. With its guides elsewhere it is another machine.
         """
         return digest_of(dict(_numbers(self)))
+
+    @cached_property
+    def bars(self) -> Bars:
+        """The legs, and the passive limb, as bodies."""
+        return Bars(self.robot, self.limb, self.bodies.leg_radius)
+
+    @property
+    def line_top(self) -> float:
+        """The least offset (metres) of a joint on the platform line: there the spindle begins."""
+        return float(self.bars.offsets.min())
 
     @property
     def calibration_name(self) -> str:
@@ -183,5 +197,7 @@ def _numbers(machine: Machine) -> Iterator[tuple[str, object]]:
             yield f"{type(part).__name__}.{item.name}", getattr(part, item.name)
     yield from (("tool_length", machine.tool_length), ("rapid_velocity", machine.rapid_velocity))
     yield from machine.tool_limits.given().items()
+    if machine.limb is not None:
+        yield from machine.limb.numbers()
     if machine.guides is not None:
         yield from (("guides", machine.guides.guides), ("travel", machine.guides.travel))

@@ -114,7 +114,8 @@ def _library() -> Traversable:
 
 def _fields(tables: Any, file: str | Path) -> dict[str, Any]:
     """Return the fields of a machine, SI, from the `MachineTables` of a file."""
-    designed = FAMILIES[tables.geometry.family].robot(tables.geometry)
+    family = FAMILIES[tables.geometry.family]
+    designed = family.robot(tables.geometry)
     guides = _guides(designed, **fields_from(GuideKeys, tables.guides))
     robot, calibration = _as_built(designed, guides, tables.calibration.file, file)
     platform = fields_from(PlatformJointKeys, tables.joints)
@@ -132,6 +133,7 @@ def _fields(tables: Any, file: str | Path) -> dict[str, Any]:
         "drives": Drives(**fields_from(Drives, tables.drives)),
         "masses": Masses(**fields_from(Masses, tables.masses)),
         "tool_limits": ToolLimits(**fields_from(ToolLimits, tables.tool)),
+        "limb": None if family.limb is None else family.limb(tables.geometry),
         "guides": guides,
         "calibration": calibration,
         "leg_model": LegModel(**fields_from(LegModel, tables.leg_model)),

@@ -112,6 +112,10 @@ FILE_KEYS = {
     "delta": "geometry.delta",
     "offsets": "geometry.platform_mm",
     "home": "geometry.home_mm",
+    "rail": "geometry.rail_direction",
+    "carriage": "geometry.rail_travel_mm",
+    "strut": "geometry.strut_mm",
+    "joint_range": "geometry.strut_angle_deg",
     "guides": "guides.direction",
     "travel": "guides.least_mm",
 }

@@ -65,12 +65,20 @@
 
   const along = (p, a, s) => p.map((value, k) => value + s * a[k]);
 
-  // The ends of what moves: the legs, their arms, the platform line, the tool, the tip (in the order of the report's scene).
+  // The passive limb's strut: square to its rail.
+  function strut(tip, axis, { origin, rail, height }) {
+    const end = along(tip, axis, height);
+    const place = end.reduce((sum, value, k) => sum + (value - origin[k]) * rail[k], 0);
+    return [along(origin, rail, place), end];
+  }
+
+  // The ends of what moves: the legs, their arms, the strut, the platform line, the tool, the tip (in the order of the report's scene).
   function lines({ tip, axis, joints }) {
     const top = along(tip, axis, machine.line_top), nose = along(tip, axis, machine.shaft_end);
     const legs = machine.base.map((base, k) => [base, joints[k]]);
     const arms = machine.arms.map(([k, height]) => [along(tip, axis, height), joints[k]]);
-    return [...legs, ...arms, [top, nose], [nose, tip], [tip, tip]];
+    const struts = machine.limb ? [strut(tip, axis, machine.limb)] : [];
+    return [...legs, ...arms, ...struts, [top, nose], [nose, tip], [tip, tip]];
   }
 
   const nearest = (t) => poses.reduce((best, pose, k) => Math.abs(pose.t - t) < Math.abs(poses[best].t - t) ? k : best, 0);

@@ -19,6 +19,7 @@ from pentapod.job.plan_arrays import matrix_mm
 from pentapod.job.schema.job import Job
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.leg_ends import arms_beside, leg_ends
+from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.placed_path import PlacedPath, UnplacedPath
 from pentapod.program.program import Program
@@ -171,8 +172,21 @@ def _poses(outcome: Outcome, signals: Signals | None) -> dict[str, Any]:
         "arms": [
             [k, round(1e3 * height, 3)] for k, height in zip(*(x.tolist() for x in arms_beside(machine)), strict=True)
         ],
-        "line_top": 1e3 * (machine.tool_length - float(machine.robot.offsets.min())),
+        "limb": _limb(machine),
+        "line_top": 1e3 * (machine.tool_length - machine.line_top),
         "shaft_end": 1e3 * machine.bodies.shaft_end,
+    }
+
+
+def _limb(machine: Machine) -> dict[str, Any] | None:
+    """Return rail and joint of the passive limb, mm: the script draws its strut."""
+    limb = machine.limb
+    if limb is None:
+        return None
+    return {
+        "origin": (1e3 * limb.origin).tolist(),
+        "rail": limb.rail.tolist(),
+        "height": 1e3 * (machine.tool_length - limb.joint),
     }
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.machine.leg_ends import arms_beside, leg_ends, line_top
+from pentapod.machine.leg_ends import arms_beside, leg_ends, line_top, rails, strut_ends
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.placed_path import PlacedPath
@@ -28,7 +28,7 @@ class _Subject:
     """What is drawn, machine frame, metres.
 
     facets (F, 3, 3); tips (K, 3); base, joints (n_legs, 3); far, tip, origin (3,).
-    arms: which legs end beside the line, and where their arms meet it (m, 3).
+    arms: which legs end beside the line, and where their arms meet it (m, 3). limb (k, 2, 3): rail and strut.
     hangs: whether the base is above the work, so that the machine's z points down. table: z of its surface, if any.
     around (G, 3, 3): facets of the fixture; holder: its name.
     """
@@ -38,6 +38,7 @@ class _Subject:
     base: Floats
     joints: Floats
     arms: tuple[Ints, Floats]
+    limb: Floats
     far: Floats
     tip: Floats
     origin: Floats
@@ -86,7 +87,8 @@ def _subject(
     origin, name = transform.translation, "" if held is None else held.name
     beside, heights = arms_beside(machine)
     arms = beside, tip + heights[:, None] * axis
-    return _Subject(facets, tips, base, joints, arms, far, tip, origin, hangs, table, around, name)
+    limb = np.concatenate([rails(machine), strut_ends(machine, tip, axis)])
+    return _Subject(facets, tips, base, joints, arms, limb, far, tip, origin, hangs, table, around, name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +157,16 @@ def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool =
         return 1e3 * points[..., axes] * (1.0, up)
 
     seen = [flat(subject.tips), flat(subject.facets).reshape(-1, 2)]
-    seen += [] if close else [flat(subject.base), flat(subject.joints), flat(subject.around).reshape(-1, 2)]
+    seen += (
+        []
+        if close
+        else [
+            flat(subject.base),
+            flat(subject.joints),
+            flat(subject.limb).reshape(-1, 2),
+            flat(subject.around).reshape(-1, 2),
+        ]
+    )
     shown = np.concatenate(seen)
     paper = _Paper(shown.min(axis=0), shown.max(axis=0), _DIMENSIONED if close else _Paper.rim)
     parts = [paper.filled(flat(subject.around), HELD_COLOUR, subject.holder)] if len(subject.around) else []
@@ -168,6 +179,7 @@ def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool =
         parts += [paper.line(leg, leg_colour(k), 2.4) for k, leg in enumerate(legs)]
         for k, foot in zip(*subject.arms, strict=True):
             parts.append(paper.line(flat(np.stack([subject.joints[k], foot])), leg_colour(k), 1.6))
+        parts += [paper.line(line, QUIET_COLOUR, 2.4) for line in flat(subject.limb)]
         parts += [paper.numbered(joint, k + 1, leg_colour(k)) for k, joint in enumerate(base)]
         parts.append(paper.line(flat(np.stack([subject.far, subject.tip])), "currentColor", 3.0))
     parts.append(paper.cross(flat(subject.origin), "origin of the mesh"))

@@ -10,7 +10,7 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.base.refusal import Refusal
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.machine.leg_ends import arms_beside, base_rim, leg_ends, line_top
+from pentapod.machine.leg_ends import arms_beside, base_rim, leg_ends, line_top, rails, strut_ends
 from pentapod.machine.machine import Machine
 from pentapod.mesh.diagnosis import fault_edges
 from pentapod.mesh.mesh import Mesh
@@ -169,7 +169,7 @@ def piece_traces(toolpath: Toolpath, pieces: Sequence[Piece]) -> list[dict[str, 
 
 
 def machine_traces(machine: Machine, tip: Floats, axis: Floats) -> list[dict[str, Any]]:
-    """Return the base, and then the traces that move: legs, arms, platform line, tool and tip, at one pose."""
+    """Return the base, and then the traces that move: legs, arms, strut, platform line, tool and tip, at one pose."""
     base = 1e3 * machine.robot.base_joints
     joints = _line3d(base, "base joints", QUIET_COLOUR, 1.0)
     joints |= {
@@ -180,12 +180,13 @@ def machine_traces(machine: Machine, tip: Floats, axis: Floats) -> list[dict[str
     return [
         _line3d(1e3 * base_rim(machine, 73), "base plane", QUIET_COLOUR, 2.0),
         joints,
+        *(_line3d(1e3 * rail, "rail", QUIET_COLOUR, 6.0) for rail in rails(machine)),
         *(_line3d(line, *look) for line, look in zip(_pose_lines(machine, tip, axis), _looks(machine), strict=True)),
     ]
 
 
 def moving_traces(machine: Machine) -> int:
-    """Return how many traces move with the pose (legs, arms, platform line, tool and tip); they are the last ones."""
+    """Return how many traces move with the pose: legs, arms, strut, platform line, tool, tip; the last ones."""
     return len(_looks(machine))
 
 
@@ -193,7 +194,8 @@ def _looks(machine: Machine) -> list[tuple[str, str, float]]:
     """Return name, colour and width of each moving line."""
     legs = [(f"leg {k + 1}", leg_colour(k), 8.0) for k in range(machine.robot.n_legs)]
     arms = [(f"arm {k + 1}", leg_colour(k), 5.0) for k in arms_beside(machine)[0].tolist()]
-    return [*legs, *arms, ("platform", "#6d7480", 14.0), ("tool", "#b9a36b", 8.0), ("tip", LIMIT_COLOUR, 3.0)]
+    strut = [("passive limb", QUIET_COLOUR, 8.0)] if machine.limb is not None else []
+    return [*legs, *arms, *strut, ("platform", "#6d7480", 14.0), ("tool", "#b9a36b", 8.0), ("tip", LIMIT_COLOUR, 3.0)]
 
 
 def _pose_lines(machine: Machine, tip: Floats, axis: Floats) -> list[Floats]:
@@ -202,7 +204,8 @@ def _pose_lines(machine: Machine, tip: Floats, axis: Floats) -> list[Floats]:
     legs, far = np.stack(leg_ends(machine, tip, axis), axis=1), line_top(machine, tip, axis)
     beside, heights = arms_beside(machine)
     arms = np.stack([tip + heights[:, None] * axis, legs[beside, 1]], axis=1)
-    return [1e3 * line for line in (*legs, *arms, np.array([far, nose]), np.array([nose, tip]), np.array([tip, tip]))]
+    line = (np.array([far, nose]), np.array([nose, tip]), np.array([tip, tip]))
+    return [1e3 * ends for ends in (*legs, *arms, *strut_ends(machine, tip, axis), *line)]
 
 
 def scene_figure(traces: list[dict[str, Any]], *, down: bool) -> Figure:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pentapod.machine.machine import Machine
+from pentapod.machine.passive_limb import PassiveLimb
 
 CYLINDER_SHARE = 0.9
 """Length of a leg's fixed part as a share of the shortest leg."""
@@ -34,14 +35,27 @@ class Capsule:
 
 def leg_cylinder(machine: Machine, leg: int) -> Capsule:
     """Return the fixed part of a leg; positions from the base joint."""
-    low = float(machine.legs.min_length[leg])
-    return Capsule(0.0, CYLINDER_SHARE * low, machine.bodies.leg_radius, machine.masses.cylinder)
+    return _cylinder(machine, float(machine.legs.min_length[leg]), machine.bodies.leg_radius)
 
 
 def leg_rod(machine: Machine, leg: int) -> Capsule:
     """Return the part that slides out of it; positions from the platform joint, towards the platform."""
     low, high = float(machine.legs.min_length[leg]), float(machine.legs.max_length[leg])
-    return Capsule(CYLINDER_SHARE * low - high, 0.0, ROD_SHARE * machine.bodies.leg_radius, machine.masses.rod)
+    return _rod(machine, low, high, machine.bodies.leg_radius)
+
+
+def limb_strut(machine: Machine, limb: PassiveLimb) -> tuple[Capsule, Capsule]:
+    """Return the strut's part at the rail, positions from there, and the one that slides in it, from its joint."""
+    low, high = limb.strut.tolist()
+    return _cylinder(machine, low, limb.radius), _rod(machine, low, high, limb.radius)
+
+
+def _cylinder(machine: Machine, low: float, radius: float) -> Capsule:
+    return Capsule(0.0, CYLINDER_SHARE * low, radius, machine.masses.cylinder)
+
+
+def _rod(machine: Machine, low: float, high: float, radius: float) -> Capsule:
+    return Capsule(CYLINDER_SHARE * low - high, 0.0, ROD_SHARE * radius, machine.masses.rod)
 
 
 def spindle(machine: Machine, top: float) -> Capsule:

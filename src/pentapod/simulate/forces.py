@@ -7,6 +7,8 @@ the displacement of the mass for each metre of the leg.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
@@ -14,8 +16,10 @@ from pentapod.base.errors import InputError
 from pentapod.kinematics.forces import FREEDOMS, held_wrenches
 from pentapod.kinematics.jacobian import pose_jacobian
 from pentapod.kinematics.legs_on_rings import LegsOnRings
+from pentapod.machine.machine import Machine
+from pentapod.machine.passive_limb import PassiveLimb
 from pentapod.numerics.blocks import blocks
-from pentapod.simulate.bodies import Capsule, leg_cylinder, leg_rod, spindle
+from pentapod.simulate.bodies import Capsule, leg_cylinder, leg_rod, limb_strut, spindle
 from pentapod.simulate.reference import Reference
 
 
@@ -55,7 +59,7 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
     at_p, at_i = np.zeros((2, len(loads), 3))
     held = robot.n_legs + robot.passive_wrenches(position[:1], direction[:1]).shape[-2] == FREEDOMS
     turning = np.zeros((len(loads), 3))  # moment about p of forces beside the line
-    for mass, z in _masses(spindle(machine, float(robot.offsets.min()))):
+    for mass, z in _masses(spindle(machine, machine.line_top)):
         force = needed(mass, position + z * direction)
         at_p, at_i = at_p + force, at_i + z * force
     for leg in range(robot.n_legs):
@@ -75,6 +79,9 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
                 if isinstance(robot, LegsOnRings):
                     on_p, on_i = robot.pose_loads(position[middle], direction[middle], leg, across)
                 at_p, at_i = at_p + on_p, at_i + on_i
+    if machine.limb is not None:
+        force = _limb_force(machine, machine.limb, position, direction, needed)
+        at_p, at_i = at_p + force, at_i + machine.limb.joint * force
     if held:
         turning += np.cross(direction[middle], at_i)
         wrenches = held_wrenches(robot, position[middle], direction[middle])
@@ -83,6 +90,27 @@ def _loads(reference: Reference, rows: Ints) -> Floats:
         return loads + np.asarray(held_by, dtype=np.float64)
     jacobian = pose_jacobian(robot, position[middle], direction[middle])
     return loads + np.einsum("ni,nil->nl", at_p, jacobian[:, :3]) + np.einsum("ni,nil->nl", at_i, jacobian[:, 3:])
+
+
+def _limb_force(
+    machine: Machine, limb: PassiveLimb, position: Floats, direction: Floats, needed: Callable[[float, Floats], Floats]
+) -> Floats:
+    """Return what the passive limb's masses need at its universal joint (n, 3), in poses (n + 2, 3).
+
+    The joint carries the carriage along the rail, and across it turns the strut about its foot. So a mass at the share
+    s of the strut takes up the joint's way along the rail, s of that across the strut, and all along it if it slides.
+    """
+    (foot, end), middle = limb.ends(position, direction), slice(1, -1)
+    length = np.linalg.norm(end - foot, axis=1, keepdims=True)
+    along, total = (end - foot) / length, np.zeros((len(position) - 2, 3))
+    for capsule, slides in zip(limb_strut(machine, limb), (0.0, 1.0), strict=True):
+        for mass, s in _masses(capsule):
+            out = s + length * slides
+            force, u = needed(mass, foot + out * along), along[middle]
+            by_rail, by_strut = ((force * v).sum(axis=1, keepdims=True) * v for v in (limb.rail, u))
+            across = force - by_rail - by_strut
+            total += by_rail + slides * by_strut + (out / length)[middle] * across
+    return total
 
 
 def _masses(capsule: Capsule) -> tuple[tuple[float, float], ...]:

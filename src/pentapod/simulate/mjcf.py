@@ -2,8 +2,9 @@
 
 Each leg is a cylinder on two hinges at its base joint, and a rod that slides out of it, as long as the slide's
 position says; `connect` constraints close the loops at the platform's joints. A leg that ends on a ring hangs on it by
-a hinge along the ring's tangent, which keeps it in a plane with the line. Where the legs do not hold the spin of the
-tool about its own line, a little damping acts on it. The constraints are as stiff as the step allows, solved by
+a hinge along the ring's tangent, which keeps it in a plane with the line. A passive limb is a cylinder that slides and
+turns on its rail, a rod in it, and a cross that hangs on the platform by a hinge. Where the legs do not hold the spin
+of the tool about its own line, a little damping acts on it. The constraints are as stiff as the step allows, solved by
 Newton's method to convergence: MuJoCo's defaults, meant for soft contacts, leave millimetres.
 """
 
@@ -21,7 +22,7 @@ from pentapod.kinematics.legs_on_rings import LegsOnRings
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.leg_model import robot_zeros
 from pentapod.machine.machine import Machine
-from pentapod.simulate.bodies import Capsule, leg_cylinder, leg_rod, spindle
+from pentapod.simulate.bodies import Capsule, leg_cylinder, leg_rod, limb_strut, spindle
 
 SOLIMP = "0.9999 0.9999 0.001 0.5 2"
 """Impedance of the constraints, MJCF's `solimp`: almost rigid."""
@@ -37,7 +38,7 @@ class MujocoModelOptions:
     spin_damping: float = 0.01
     """Damping of the tool's spin about its own line, and of rings about it, N·m·s."""
     ring_mass: float = 0.02
-    """Mass of a ring on which a leg ends, kg."""
+    """Mass of a ring on which a leg ends, and of the cross of a universal joint, kg."""
     hinge: float = 0.03
     """Half the length of the hinge by which a leg hangs on a ring or in a revolute joint, m."""
 
@@ -80,7 +81,7 @@ def mjcf(
             _add(rod, "joint", name=f"turn{leg + 1}", type="hinge", axis="0 0 1")
             aside = _turned_back(_rotation_from_z(pose[1]), model.hinge * hinges[leg])
             _add(rod, "site", name=f"rod{leg + 1}side", pos=aside)
-    _platform(world, machine, real, position, direction, model)
+    platform = _platform(world, machine, real, position, direction, model)
     loops = _add(root, "equality")
     actuators = _add(root, "actuator")
     drives = machine.drives
@@ -92,6 +93,7 @@ def mjcf(
     for leg in hinges:  # after all loops, whose forces are read by their places
         name = f"{leg + 1}side"
         _add(loops, "connect", name=f"hinge{leg + 1}", site1=f"rod{name}", site2=f"platform{name}")
+    _limb(world, platform, loops, machine, real, (position, direction), model)
     free = real.n_legs + real.passive_wrenches(position, direction).shape[-2] < FREEDOMS
     if free:
         _add(actuators, "velocity", name="spin", site="origin", gear="0 0 0 0 0 1", kv=[model.spin_damping])
@@ -118,6 +120,48 @@ def _leg(
     return rod
 
 
+def _limb(
+    world: Xml.Element,
+    platform: Xml.Element,
+    loops: Xml.Element,
+    machine: Machine,
+    real: Robot,
+    pose: tuple[Floats, Floats],
+    model: MujocoModelOptions,
+) -> None:
+    """Add the passive limb: z of its bodies along the strut, x along the rail, the hinge of its cross along y.
+
+    The robot's passive joint holds a moment along rail × y.
+    """
+    limb = machine.limb
+    if limb is None:
+        return
+    foot, end = limb.ends(*pose)
+    length = float(np.linalg.norm(end - foot))
+    along = (end - foot) / length
+    moment = real.passive_wrenches(*pose)[0, 3:]
+    hinge = np.cross(moment, limb.rail)  # y, as it is perpendicular to the rail
+    hinge *= model.hinge / np.linalg.norm(hinge)
+    frame = np.stack([limb.rail, np.cross(along, limb.rail), along], axis=1)
+    body = _add(world, "body", name="limb", pos=foot, xyaxes=[*frame[:, 0], *frame[:, 1]])
+    for name, kind in (("carriage", "slide"), ("rail", "hinge")):
+        _add(body, "joint", name=name, type=kind, axis="1 0 0")
+    cylinder, slider = limb_strut(machine, limb)
+    _capsule(body, cylinder, _STEEL)
+    rod = _add(body, "body", name="strut", pos=[0.0, 0.0, length])
+    _add(rod, "joint", name="strut", type="slide", axis="0 0 1")
+    _capsule(rod, slider, _ROD)
+    cross = _add(rod, "body", name="cross")
+    _add(cross, "joint", name="cross", type="hinge", axis="1 0 0")
+    _inertia(cross, model.hinge, model)
+    quaternion = _rotation_from_z(pose[1])
+    for name, off in (("limb", 0.0 * hinge), ("limbside", hinge)):
+        at = np.array([0.0, 0.0, limb.joint]) + _turned_back(quaternion, off)
+        _add(cross, "site", name=f"cross{name}", pos=off @ frame)
+        _add(platform, "site", name=f"platform{name}", pos=at)
+        _add(loops, "connect", name=name, site1=f"cross{name}", site2=f"platform{name}")
+
+
 def _platform(
     world: Xml.Element,
     machine: Machine,
@@ -125,9 +169,10 @@ def _platform(
     position: Floats,
     direction: Floats,
     model: MujocoModelOptions,
-) -> None:
+) -> Xml.Element:
     """Add the platform: a free body whose z axis is the platform line, its origin p; rings turn about that line."""
-    shaft, tool = spindle(machine, float(real.offsets.min())), machine.tool_length
+    top = float(real.offsets.min()) if machine.limb is None else machine.line_top
+    shaft, tool = spindle(machine, top), machine.tool_length
     body = _add(world, "body", name="platform", pos=position, quat=_rotation_from_z(direction))
     _add(body, "freejoint", name="platform")
     _capsule(body, shaft, _SPINDLE)
@@ -147,11 +192,16 @@ def _platform(
             continue
         ring = _add(body, "body", name=f"ring{leg + 1}", pos=height)
         _add(ring, "joint", name=f"ring{leg + 1}", type="hinge", axis="0 0 1", damping=[model.spin_damping])
-        inertia = model.ring_mass * max(float(radii[leg]), model.hinge) ** 2  # a speck would not be simulated
-        still = [inertia, inertia, inertia]
-        _add(ring, "inertial", pos=[0.0, 0.0, 0.0], mass=[model.ring_mass], diaginertia=still)
+        _inertia(ring, max(float(radii[leg]), model.hinge), model)  # a speck would not be simulated
         for at, place in ((name, off[leg]), (f"{name}side", off[leg] + model.hinge * hinges[leg])):
             _add(ring, "site", name=at, pos=_turned_back(_rotation_from_z(direction), place))
+    return body
+
+
+def _inertia(body: Xml.Element, radius: float, model: MujocoModelOptions) -> None:
+    """Give a body the mass of a ring, as far from its origin as `radius`, metres."""
+    inertia = model.ring_mass * radius**2
+    _add(body, "inertial", pos=[0.0, 0.0, 0.0], mass=[model.ring_mass], diaginertia=[inertia] * 3)
 
 
 def _capsule(body: Xml.Element, capsule: Capsule, colour: str) -> None:

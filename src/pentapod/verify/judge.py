@@ -23,6 +23,7 @@ from pentapod.verify.claims import (
     gouge,
     joints,
     legs,
+    passive_limb,
     path_deviation,
     pieces,
     placement,
@@ -47,6 +48,7 @@ CLAIMS: tuple[Claim, ...] = (
     *component.CLAIMS,
     *legs.CLAIMS,
     *joints.CLAIMS,
+    *passive_limb.CLAIMS,
     *bodies.CLAIMS,
     *gouge.CLAIMS,
     *surface_left.CLAIMS,
@@ -125,7 +127,7 @@ def judged(
         )
     replay, unjudged = Replay(program, specification, progress), list[NotJudged]()
     _ = replay.interval_bounds  # first, because its progress is the first share
-    around = collisions.claims(specification.collision_world, specification.machine.robot.n_legs)
+    around = collisions.claims(specification.collision_world, len(specification.machine.bars.names))
     claims = (*CLAIMS, *around, *claims)
     for k, claim in enumerate(claims):
         progress("verify", REPLAY_SHARE + (1.0 - REPLAY_SHARE) * k / len(claims), claim.name)

@@ -10,7 +10,7 @@ from pentapod.base.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.legs_on_rings import LegsOnRings
 from pentapod.machine.clearance.collision_world import mounted
-from pentapod.machine.leg_ends import arms_beside, base_rim
+from pentapod.machine.leg_ends import arms_beside, base_rim, rails, strut_ends
 from pentapod.report.decimate import thinned_mesh
 from pentapod.report.figure import LIMIT_COLOUR, leg_colour
 from pentapod.view.motion import MachinePose
@@ -65,6 +65,8 @@ class ViewerScene:
         self._arms = [
             self._cylinder(f"/arms/{k + 1}", 0.6 * radius, _rgb(leg_colour(k))) for k in self._beside.tolist()
         ]
+        limb = run.machine.limb
+        self._strut = None if limb is None else self._cylinder("/limb/strut", limb.radius, STEEL)
         self._joints = [
             api.add_icosphere(f"/joints/{k + 1}", 1.6 * radius, color=_rgb(leg_colour(k)))
             for k in range(run.machine.robot.n_legs)
@@ -98,6 +100,8 @@ class ViewerScene:
 
             for arm, k, height in zip(self._arms, self._beside, self._heights, strict=True):
                 _stretch(arm, machine_pose.tip + height * machine_pose.axis, machine_pose.joints[k])
+            if self._strut is not None:
+                _stretch(self._strut, *strut_ends(self._run.machine, machine_pose.tip, machine_pose.axis)[0])
 
     def _set_up(self, server: viser.ViserServer) -> None:
         """Set the camera: the work from the side, the base above it."""
@@ -116,6 +120,9 @@ class ViewerScene:
         rim = base_rim(self._run.machine, 97)
         rim = np.stack([rim[:-1], rim[1:]], axis=1)
         self._server.scene.add_line_segments("/base/rim", rim, DARK, thickness=3.0, thickness_units="screen")
+        if self._run.machine.limb is not None:
+            rail = rails(self._run.machine)
+            self._server.scene.add_line_segments("/limb/rail", rail, DARK, thickness=5.0, thickness_units="screen")
         ball = 1.8 * self._run.machine.bodies.leg_radius
         for k, joint in enumerate(base):
             self._server.scene.add_icosphere(f"/base/{k + 1}", ball, color=_rgb(leg_colour(k)), position=joint)
@@ -126,7 +133,7 @@ class ViewerScene:
         run, api = self._run, self._server.scene
         machine = run.machine
         heights = machine.tool_length - machine.robot.offsets
-        top, nose = float(heights.max()), machine.bodies.shaft_end
+        top, nose = machine.tool_length - machine.line_top, machine.bodies.shaft_end
         self._cylinder("/tool/spindle", machine.bodies.shaft_radius, STEEL, nose, top)
         self._cylinder("/tool/shaft", SHAFT_SHARE * machine.bodies.shaft_radius, DARK, 0.0, nose)
         if isinstance(machine.robot, LegsOnRings):

@@ -8,6 +8,8 @@ import trimesh
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.solids import Solid
 from pentapod.kinematics.component import Component
+from pentapod.kinematics.mode import Mode
+from pentapod.machine import Machine
 from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
 from pentapod.machine.clearance.leg_clearance import clearances
 from pentapod.mesh.mesh import Mesh
@@ -48,9 +50,13 @@ def poses(machine, count, seed=0):
 
 @pytest.fixture(scope="module")
 def crowd():
+    return crowd_with_fence_at([0.25, 0.0, 0.35])
+
+
+def crowd_with_fence_at(middle):
     """A post that moves with the part and a fence that does not, with shank and holder on the tool."""
     fence = trimesh.creation.box((0.02, 0.3, 0.2))
-    fence.apply_translation([0.25, 0.0, 0.35])
+    fence.apply_translation(middle)
     return CollisionWorld(
         (
             Obstacle("fixture", surface_of(post(0.06, 0.02, -0.02, 0.06)), clamped=True),
@@ -60,10 +66,13 @@ def crowd():
     )
 
 
+def at_work(machine):
+    return RigidTransform(np.diag([1.0, -1.0, -1.0]), machine.work.centre)
+
+
 @pytest.fixture(scope="module")
 def place(desk):
-    turn = np.diag([1.0, -1.0, -1.0])
-    return RigidTransform(turn, desk.work.centre)
+    return at_work(desk)
 
 
 def test_limits_are_named_in_the_order_of_the_values(desk, crowd, place):
@@ -103,11 +112,16 @@ def test_margins_are_distances_of_samples(desk, crowd, place):
             assert outer[row, leg] == pytest.approx(min(oracle, caps[leg]), abs=2e-3)
 
 
-def test_the_formula_equals_the_margins_and_their_slopes(desk, crowd, place):
+@pytest.mark.parametrize(
+    ("name", "fence"), [("desk", [0.25, 0.0, 0.35]), ("spr", [-0.24, -0.15, 0.12]), ("prpu", [-0.2, 0.15, 0.15])]
+)
+def test_the_formula_equals_the_margins_and_their_slopes(name, fence):
     """At the poses where contacts were taken: the value, and central differences of the true margins."""
-    margins = Margins.of(desk, PLUS, crowd)
-    tips, axes = poses(desk, 80, seed=3)
-    count = 14
+    machine, crowd = Machine.load(name), crowd_with_fence_at(fence)
+    tips, axes = poses(machine, 80, seed=3)
+    branch = machine.robot.branch(tips[0] + machine.tool_length * axes[0], -axes[0])
+    margins, place = Margins.of(machine, Mode(*branch.tolist()), crowd), at_work(machine)
+    count = len(margins.limits) - len(margins.own_limits)
     tip, axis, turn, shift = (ca.SX.sym("x", *size) for size in ((3,), (3,), (3, 3), (3,)))
     numbers = ca.SX.sym("c", margins.contact_numbers)
     whole = margins.symbolic(tip, axis, turn, shift, numbers)[-count:]

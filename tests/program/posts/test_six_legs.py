@@ -55,7 +55,7 @@ def test_linuxcnc_has_an_axis_for_each_leg(tmp_path) -> None:
 
 @pytest.mark.slow
 @real
-@pytest.mark.parametrize("name", ["hexa", "spr"])
+@pytest.mark.parametrize("name", ["hexa", "spr", "prpu"])
 def test_linuxcnc_plays_the_legs_of_platforms(name: str, tmp_path) -> None:
     """As setpoints, unchanged by the limits of the legs, and as axes of their own, to the last row."""
     machine = Machine.load(name)

@@ -23,11 +23,13 @@ from pentapod.numerics.bernstein import elevate, multiply
 class KrawczykOptions:
     """contraction: largest sum over a row of Q. slack: share that is added to bounds. wider: radius r by β.
 
+    narrowest: least component of r by the largest, where each has its own: the smaller ones depend on the others.
     rounding: error of an equation, and of |1 − C J| by |C| |J|; 2⁻⁴⁴ is more than lemma 4 of docs/proofs.md asks.
     """
 
     contraction: float = 0.9
     wider: float = 2.0
+    narrowest: float = 0.3
     rounding: float = 2.0**-44
     slack: float = 1e-9
 
@@ -129,7 +131,8 @@ class Equations:
         wide[:, :5] = np.maximum(np.abs(residual[:, :5] - low), np.abs(residual[:, :5] - high))
         with np.errstate(invalid="ignore", over="ignore"):
             beta = np.einsum("nij,nj->ni", np.abs(c), wide + OPTIONS.rounding)
-            return self._contracted(beta, OPTIONS.wider * beta, c, defect, np.zeros_like(beta))[1]
+            radius = OPTIONS.wider * np.maximum(beta, OPTIONS.narrowest * beta.max(axis=1, keepdims=True))
+            return self._contracted(beta, radius, c, defect, np.zeros_like(beta))[1]
 
     def _contracted(
         self, beta: Floats, radius: Floats, c: Floats, defect: Floats, half: Floats

@@ -59,7 +59,7 @@ class CollisionWorld(Value):
         be in the part and still count as clear. Raises MachineError where the tool is too long for the machine.
         """
         body = mounted(tool.solids, machine)
-        room = machine.tool_length - float(machine.robot.offsets.max())
+        room = machine.tool_length - float(machine.bars.offsets.max())
         if body and max(solid.high for solid in body) > room:
             raise MachineError(
                 "the tool stands above the lowest platform joint",
@@ -73,10 +73,9 @@ class CollisionWorld(Value):
                 found.append(Obstacle(name, MeshDistance.of(mesh), clamped=name == "fixture"))
         return cls(tuple(found), body)
 
-    def names(self, n_legs: int) -> tuple[str, ...]:
-        """Return the names (K,) of the moving bodies: the legs, the spindle, and the tool body where there is one."""
-        legs = tuple(f"leg {k + 1}" for k in range(n_legs))
-        return (*legs, "spindle", *((TOOL_BODY,) if self.tool else ()))
+    def names(self, machine: Machine) -> tuple[str, ...]:
+        """Return the names (K,) of the moving bodies: the bars, the spindle, and the tool body where there is one."""
+        return (*machine.bars.names, "spindle", *((TOOL_BODY,) if self.tool else ()))
 
 
 NOTHING = CollisionWorld()
@@ -87,9 +86,9 @@ NOTHING = CollisionWorld()
 class MovingBodies:
     """Positions of the moving bodies in N poses, in an obstacle's frame, metres.
 
-    starts, ends (N, n_legs + 1, 3): axes of the legs, base joint to platform joint, and of the spindle. tips, axes
-    (N, 3): of the tool, the axis unit, tip → spindle. radii (n_legs + 1,): of legs and spindle. feet (N, n_legs + 1,
-    3): of the legs' arms, on the platform line; arms (n_legs + 1,): which bodies have one. An arm counts as part of its
+    starts, ends (N, B + 1, 3): axes of the bars (`Machine.bars`), base to platform, and of the spindle. tips, axes
+    (N, 3): of the tool, the axis unit, tip → spindle. radii (B + 1,): of bars and spindle. feet (N, B + 1,
+    3): of the legs' arms, on the platform line; arms (B + 1,): which bodies have one. An arm counts as part of its
     leg: a capsule of its radius from platform joint to foot.
     """
 
@@ -106,32 +105,30 @@ class MovingBodies:
         cls, machine: Machine, position: Floats, direction: Floats, frame: RigidTransform | None = None
     ) -> MovingBodies:
         """Return the bodies at poses (N, 3) of the machine; frame: that of the obstacle → machine, if another."""
-        robot, top, nose = machine.robot, *spindle_ends(machine)
-        count = len(position)
-        bases = np.broadcast_to(robot.base_joints, (count, robot.n_legs, 3))
-        joints = robot.platform_joints(position, direction)
+        bars, top, nose = machine.bars, *spindle_ends(machine)
+        bases, joints = bars.ends(position, direction)
         starts = np.concatenate([bases, (position + top * direction)[:, None]], axis=1)
         ends = np.concatenate([joints, (position + nose * direction)[:, None]], axis=1)
         tips, axes = position + machine.tool_length * direction, -direction
-        heights = np.append(robot.offsets, nose)
-        arms = np.append(robot.arms > 0.0, False)
+        heights = np.append(bars.offsets, nose)
+        arms = np.append(bars.beside, False)
         feet = position[:, None] + heights[:, None] * direction[:, None] if arms.any() else ends
         if frame is not None:
             back = frame.inverse()
             starts, ends, tips, axes = back.apply(starts), back.apply(ends), back.apply(tips), back.rotate(axes)
             feet = back.apply(feet) if arms.any() else ends
-        radii = np.append(np.full(robot.n_legs, machine.bodies.leg_radius), machine.bodies.shaft_radius)
+        radii = np.append(bars.radii, machine.bodies.shaft_radius)
         return cls(starts, ends, tips, axes, radii, feet, arms)
 
     def only(self, columns: Sequence[int]) -> MovingBodies:
-        """Return some of the legs and the spindle."""
+        """Return some of the bars and the spindle."""
         of = list(columns)
         return MovingBodies(
             self.starts[:, of], self.ends[:, of], self.tips, self.axes, self.radii[of], self.feet[:, of], self.arms[of]
         )
 
     def segments(self, surface: MeshDistance, within: float) -> Gap:
-        """Return the gaps of legs and spindle, (N · (n_legs + 1),), surface to surface, none above `within`."""
+        """Return the gaps of bars and spindle, (N · (B + 1),), surface to surface, none above `within`."""
         far = within + float(self.radii.max())
         axes = surface.segments(self.starts.reshape(-1, 3), self.ends.reshape(-1, 3), far)
         if self.arms.any():
@@ -164,7 +161,7 @@ class MovingBodies:
 
 def spindle_ends(machine: Machine) -> tuple[float, float]:
     """Return the offsets along the platform line of the spindle's top and of its nose, metres."""
-    return float(machine.robot.offsets.min()), machine.tool_length - machine.bodies.shaft_end
+    return machine.line_top, machine.tool_length - machine.bodies.shaft_end
 
 
 def mounted(solids: Sequence[Solid], machine: Machine) -> tuple[Solid, ...]:

@@ -13,42 +13,44 @@ from pentapod.machine.machine import Machine
 
 def pair_names(machine: Machine) -> tuple[str, ...]:
     """Return the names of the pairs, in the order of `clearances`: "legs 1-2" ... "leg 1-shaft" ...."""
-    count = machine.robot.n_legs
-    legs = tuple(f"legs {a + 1}-{b + 1}" for a, b in combinations(range(count), 2))
-    return legs + tuple(f"leg {k + 1}-shaft" for k in range(count))
+    names, count = machine.bars.names, machine.robot.n_legs
+    pairs = (
+        f"legs {a + 1}-{b + 1}" if b < count else f"{names[a]}-{names[b]}"
+        for a, b in combinations(range(len(names)), 2)
+    )
+    return (*pairs, *(f"{name}-shaft" for name in names))
 
 
 def clearances(machine: Machine, position: ArrayLike, direction: ArrayLike) -> Floats:
     """Return surface-to-surface distances (..., pairs) in metres of poses (..., 3), negative in an overlap.
 
-    First the pairs of legs, each a capsule from base joint to platform joint, and with its arm, a capsule of the same
-    radius, where it ends beside the line. Then the legs and the shaft (`Bodies`): there a leg that ends on the line
-    ends `joint_radius` short of its platform joint. Where axes cross the distance is −(sum of the radii),
-    whatever the depth.
+    First the pairs of legs and passive limb, each a capsule from base joint to platform joint, and with its arm, a
+    capsule of the same radius, where it ends beside the line. Then they and the shaft (`Bodies`): there a bar
+    that ends on the line ends `joint_radius` short of its platform joint. Where axes cross the distance is −(sum of the
+    radii), whatever the depth.
     """
     p, i = as_batch(position, "position", (3,)), as_batch(direction, "direction", (3,))
-    robot, bodies = machine.robot, machine.bodies
-    vectors = robot.leg_vectors(p, i)
-    base = robot.base_joints
-    ends = base + vectors
-    a, b = np.array(list(combinations(range(robot.n_legs), 2))).T
-    apart = segment_distance(base[a], ends[..., a, :], base[b], ends[..., b, :])
-    beside = robot.arms > 0.0
+    bars, bodies = machine.bars, machine.bodies
+    base, ends = bars.ends(p, i)
+    beside, offsets, radii = bars.beside, bars.offsets, bars.radii
+    a, b = np.array(list(combinations(range(len(radii)), 2))).T
+    apart = segment_distance(base[..., a, :], ends[..., a, :], base[..., b, :], ends[..., b, :])
     for one, other in ((a, b), (b, a)):
-        pairs = beside[other] & ~beside[one]
+        pairs = beside[other]
         leg, arm = one[pairs], other[pairs]
-        feet = p[..., None, :] + robot.offsets[arm][:, None] * i[..., None, :]
-        to_arm = segment_distance(base[leg], ends[..., leg, :], ends[..., arm, :], feet)
+        feet = p[..., None, :] + offsets[arm][:, None] * i[..., None, :]
+        to_arm = segment_distance(base[..., leg, :], ends[..., leg, :], ends[..., arm, :], feet)
         apart[..., pairs] = np.minimum(apart[..., pairs], to_arm)
-    legs = apart - 2.0 * bodies.leg_radius
+    legs = apart - (radii[a] + radii[b])
 
+    vectors = ends - base
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     joined = np.where(beside, 0.0, bodies.joint_radius)[:, None]
     short = base + vectors * np.maximum(1.0 - joined / length, 0.0)
-    top = p + robot.offsets.min() * i
+    top = p + machine.line_top * i
     nose = p + (machine.tool_length - bodies.shaft_end) * i
     shaft = segment_distance(base, short, top[..., None, :], nose[..., None, :])
-    return np.concatenate([legs, shaft - bodies.leg_radius - bodies.shaft_radius], axis=-1)
+    return np.concatenate([legs, shaft - radii - bodies.shaft_radius], axis=-1)
 
 
 def segment_distance(start_a: ArrayLike, end_a: ArrayLike, start_b: ArrayLike, end_b: ArrayLike) -> Floats:

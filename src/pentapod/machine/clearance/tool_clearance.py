@@ -28,17 +28,17 @@ _TINY = 1e-18
 
 
 def leg_spindle_gap(machine: Machine, leg: int, cosine: Any, do: Arithmetic) -> Any:
-    """Return the gap in metres of a leg from the spindle; cosine: of the angle θ.
+    """Return the gap in metres of a bar that ends on the line from the spindle; cosine: of the angle θ.
 
     The leg counts from `joint_radius` on. Its distance from the line grows along it, so its nearest point is there.
     """
-    bodies, robot = machine.bodies, machine.robot
+    bodies, bars = machine.bodies, machine.bars
     sine = _sine(cosine, do)
-    height = machine.tool_length - float(robot.offsets[leg]) + bodies.joint_radius * cosine
-    top = machine.tool_length - float(robot.offsets.min())
+    height = machine.tool_length - float(bars.offsets[leg]) + bodies.joint_radius * cosine
+    top = machine.tool_length - machine.line_top
     beyond = do.most(do.most(height - top, bodies.shaft_end - height), 0.0)
     aside = bodies.joint_radius * sine
-    return do.sqrt(aside * aside + beyond * beyond + _TINY) - bodies.shaft_radius - bodies.leg_radius
+    return do.sqrt(aside * aside + beyond * beyond + _TINY) - bodies.shaft_radius - float(bars.radii[leg])
 
 
 def leg_tool_gap(machine: Machine, solids: Sequence[Solid], leg: int, cosine: Any, length: Any, do: Arithmetic) -> Any:
@@ -47,7 +47,7 @@ def leg_tool_gap(machine: Machine, solids: Sequence[Solid], leg: int, cosine: An
     cosine: of θ; length: of the leg, metres. A negative gap is the depth of the leg below a rim of the solid, or of the
     platform joint below the solid's top.
     """
-    joint = machine.tool_length - float(machine.robot.offsets[leg])
+    joint = machine.tool_length - float(machine.bars.offsets[leg])
     sine = _sine(cosine, do)
     end_r, end_h = length * sine, joint + length * cosine
     gaps: list[Any] = []
@@ -64,7 +64,7 @@ def leg_tool_gap(machine: Machine, solids: Sequence[Solid], leg: int, cosine: An
         aside, off = end_r - solid.low_radius - share * step_r, end_h - low - share * step_h
         found = do.least(found, do.sqrt(aside * aside + off * off + _TINY)) - solid.rounding
         gaps.append(found)
-    return reduce(do.least, gaps) - machine.bodies.leg_radius
+    return reduce(do.least, gaps) - float(machine.bars.radii[leg])
 
 
 def widest_stretch(solids: Sequence[Solid]) -> tuple[float, float, float]:
@@ -77,16 +77,17 @@ def widest_stretch(solids: Sequence[Solid]) -> tuple[float, float, float]:
 
 
 def leg_tool_gaps(machine: Machine, solids: Sequence[Solid], position: Floats, direction: Floats) -> Floats:
-    """Return the gaps (N, n_legs) in metres of the legs from a tool's solids in poses (N, 3)."""
-    vectors = machine.robot.leg_vectors(position, direction)
+    """Return the gaps (N, bars) in metres of the legs and the passive limb from a tool's solids in poses (N, 3)."""
+    bars = machine.bars
+    starts, joints = bars.ends(position, direction)
+    vectors = joints - starts
     lengths = np.linalg.norm(vectors, axis=-1)
     cosines = np.einsum("nji,ni->nj", vectors, direction) / lengths
     gaps = [leg_tool_gap(machine, solids, k, cosines[:, k], lengths[:, k], NUMPY) for k in range(len(lengths.T))]
-    base, (low, high, radius) = machine.robot.base_joints, widest_stretch(solids)
-    for k in np.flatnonzero(machine.robot.arms).tolist():
+    low, high, radius = widest_stretch(solids)
+    for k in np.flatnonzero(bars.beside).tolist():
         ends = (position + (machine.tool_length - height) * direction for height in (low, high))
-        apart = segment_distance(base[k], base[k] + vectors[:, k], *ends)
-        gaps[k] = apart - radius - machine.bodies.leg_radius
+        gaps[k] = segment_distance(starts[:, k], joints[:, k], *ends) - radius - float(bars.radii[k])
     return np.stack(gaps, axis=1)
 
 

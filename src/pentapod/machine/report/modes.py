@@ -86,10 +86,10 @@ def admissible_modes(machine: Machine, legs: ArrayLike, *, leg_error: float = 1e
         return Refusal("modes", *_without_pose(machine, readings, leg_error))
     signs = np.array(list(product((-1.0, 1.0), repeat=count)))
     hull = np.broadcast_to(readings + leg_error * signs, (len(branches), len(signs), count))
-    points = np.array([*robot.offsets, machine.tool_length])
+    points = np.array([*machine.bars.offsets, machine.tool_length])
     moved, turned = robot.enclose((position, direction), hull, points)
     if robot.arms.any():
-        moved[:, :-1] = robot.enclose_joints((position, direction), hull)
+        moved[:, :count] = robot.enclose_joints((position, direction), hull)
     if not np.isfinite(moved).all():
         near = [str(branch) for branch, by in zip(branches, moved, strict=True) if not np.isfinite(by).all()]
         return Refusal(
@@ -157,13 +157,13 @@ def _excluded(
 ) -> list[tuple[str, ...]]:
     """Return for each pose (N, 3) the limits that it breaks for certain.
 
-    moved (N, n_legs + 1): by how much platform joints and tip can be elsewhere; turned (N,): how far the direction's
+    moved (N, bars + 1): by how much platform joints and tip can be elsewhere; turned (N,): how far the direction's
     end can.
     """
     robot, joints = machine.robot, machine.joints
     vectors = robot.leg_vectors(position, direction)
     length = np.linalg.norm(vectors, axis=2)
-    slack = np.arcsin(np.minimum(moved[:, :-1] / length, 1.0))
+    slack = np.arcsin(np.minimum(moved[:, : robot.n_legs] / length, 1.0))
     swing = slack + 2.0 * np.arcsin(np.minimum(0.5 * turned, 1.0))[:, None]
     base = angle_between(vectors, joints.base_axes)
     platform = angle_between(-vectors, -direction[:, None, :])

@@ -22,6 +22,8 @@ from pentapod.machine.work_volume import sample_work_volume
 
 AMPLIFICATION_LIMIT = 10.0
 """Tip force → leg forces beyond which `check` calls a machine weak: 100 N of cutting become 1 kN of leg."""
+LIMB_PARTS = ("carriage on its rail", "strut", "strut's joint")
+"""What a passive limb is judged by."""
 LEVELS = 5
 """Heights at which `check` samples the work volume."""
 
@@ -103,6 +105,7 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = L
         turn = orientation_distance(robot, position, direction, about=machine.tool_length)
     force = tip_force_amplification(robot, position, direction, machine.tool_length)
     gaps = clearances(machine, position, direction)
+    limb = np.zeros((len(tips), 0)) if machine.limb is None else machine.limb.at(position, direction)
     met = {tuple(signs) for signs in robot.branch(position, direction).tolist()}  # 0 on a singularity
     one = next((branch for branch in robot.branches if met == {tuple(branch)}), None)
     pair = pair_names(machine)[int(np.argmin(gaps.min(axis=0)))]
@@ -136,6 +139,7 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = L
         branch=one,
         findings=(
             *_of_legs(machine, lengths, base, platform, worst),
+            *_of_limb(machine, limb, worst),
             MachineFinding("components met", len(met), "at most", 1, "", where(nearest)),
             *limits,
             worst("tip force to leg forces", force, "at most", AMPLIFICATION_LIMIT, "N/N"),
@@ -144,6 +148,17 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = L
             *_of_rails(machine),
         ),
     )
+
+
+def _limb_lines(report: MachineReport) -> list[str]:
+    """Return the lines about the passive limb: used, and how far it can go."""
+    found = [finding for finding in report.findings if finding.name.split(", ")[0] in LIMB_PARTS]
+    lines: list[str] = []
+    for least, most in zip(found[::2], found[1::2], strict=True):
+        unit, name = "°" if least.unit == "deg" else " mm", least.name.removesuffix(", least")
+        used = f"{least.value:.1f} to {most.value:.1f}{unit} of {least.limit:.0f} to {most.limit:.0f}{unit}"
+        lines.append(f"  {name:<35}   {used}")
+    return ["", *lines] if lines else []
 
 
 def _in_unit(margin: Floats, unit: str) -> Floats:
@@ -169,6 +184,21 @@ def _of_legs(
             worst(f"leg {k + 1} base joint", np.degrees(base[:, k]), "at most", cone, "deg"),
             worst(f"leg {k + 1} platform joint, least", seen, "at least", least, "deg"),
             worst(f"leg {k + 1} platform joint, most", seen, "at most", most, "deg"),
+        ]
+    return found
+
+
+def _of_limb(machine: Machine, at: Floats, worst: Callable[..., MachineFinding]) -> list[MachineFinding]:
+    """Return the worst values of the passive limb, from what it measures in the poses (N, 3)."""
+    limb, found = machine.limb, list[MachineFinding]()
+    if limb is None:
+        return found
+    ranges = (limb.carriage, limb.strut, limb.joint_range)
+    for k, (name, ends, unit) in enumerate(zip(LIMB_PARTS, ranges, ("mm", "mm", "deg"), strict=True)):
+        values, (least, most) = _in_unit(at[:, k], unit), _in_unit(ends, unit)
+        found += [
+            worst(f"{name}, least", values, "at least", least, unit),
+            worst(f"{name}, most", values, "at most", most, unit),
         ]
     return found
 
@@ -203,6 +233,7 @@ def explain(report: MachineReport) -> str:
             f"{np.degrees(report.base_angle[k]):5.1f}° of {np.degrees(m.joints.base_cone[k]):.0f}°   "
             f"{least:5.1f}° to {most:5.1f}°"
         )
+    lines += _limb_lines(report)
     component = "several: a singularity runs through it" if report.branch is None else str(report.branch)
     lines += ["", f"  component                             {component}"]
     for surface, margin in zip(m.robot.singularities, report.margins, strict=True):

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from pentapod.base.arrays import Floats
 from pentapod.base.errors import MachineError
 from pentapod.kinematics.platforms.constrained import ConstrainedPlatform
 from pentapod.machine.families import Family, GeometryTable
@@ -24,12 +25,17 @@ class SprTable(GeometryTable):
     ]
 
 
-def _robot(table: Any) -> ConstrainedPlatform:
+def platform_joints(table: Any) -> Floats:
+    """Return where the legs end (5, 3) in the platform's frame, metres. Raises MachineError."""
     if table.delta is not None or table.platform_mm is None:
         raise MachineError(
             "the platform is missing", key="geometry", expected="platform_mm with five numbers, no delta"
         )
-    joints = np.column_stack([table.si.beside, table.si.platform])
+    return np.column_stack([table.si.beside, table.si.platform])
+
+
+def _robot(table: Any) -> ConstrainedPlatform:
+    joints = platform_joints(table)
     return ConstrainedPlatform(np.array(table.si.base), joints, "revolute leg", np.array(table.si.home))
 
 

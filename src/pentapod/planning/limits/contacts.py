@@ -55,7 +55,7 @@ def body_comforts(scene: Scene) -> tuple[float, ...]:
     """Return the gaps (K,) in metres that count as margin 1, in the order of `CollisionWorld.names`."""
     comforts = scene.comforts
     tool = (world_tool_comfort(scene.collision_world, comforts),) if scene.collision_world.tool else ()
-    return (*[comforts.leg_obstacle] * scene.machine.robot.n_legs, comforts.spindle_obstacle, *tool)
+    return (*[comforts.leg_obstacle] * len(scene.machine.bars.names), comforts.spindle_obstacle, *tool)
 
 
 def world_tool_comfort(collision_world: CollisionWorld, comforts: Comforts) -> float:
@@ -116,10 +116,10 @@ def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts:
     Places: from 0 to 1 along a leg, from 1 to 2 along its arm; along the spindle, heights over the tip.
     """
     top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
-    columns, n_legs = list[Floats](), machine.robot.n_legs
-    for body in range(n_legs + 1):
+    columns, bars = list[Floats](), len(machine.bars.names)
+    for body in range(bars + 1):
         radius, cap = float(bodies.radii[body]), OPTIONS.cap * comforts[body]
-        places = (0.0, 1.0) if body < n_legs else (top, nose)
+        places = (0.0, 1.0) if body < bars else (top, nose)
         column = _column(obstacle, bodies.starts[:, body], bodies.ends[:, body], radius, cap, places)
         if bodies.arms[body]:
             arm = _column(obstacle, bodies.ends[:, body], bodies.feet[:, body], radius, cap, (1.0, 2.0))
@@ -153,18 +153,18 @@ def _column(
 def _near(scene: Scene, obstacle: Obstacle, tips: Floats, axes: Floats, frame: RigidTransform | None) -> Ints:
     """Return the indices of those poses (N, 3) in which a body's bounding box is near the obstacle's."""
     machine, tool, comforts = scene.machine, scene.collision_world.tool, scene.comforts
-    robot, bodies = machine.robot, machine.bodies
-    position = tips + machine.tool_length * axes
-    base, joints, arms = robot.base_joints, robot.platform_joints(position, -axes), np.flatnonzero(robot.arms).tolist()
-    feet = {k: position - robot.offsets[k] * axes for k in arms}
+    bars, bodies = machine.bars, machine.bodies
+    position, arms = tips + machine.tool_length * axes, np.flatnonzero(bars.beside).tolist()
+    base, joints = bars.ends(position, -axes)
+    feet = {k: position - bars.offsets[k] * axes for k in arms}
     if frame is not None:
         back = frame.inverse()
         tips, axes, base, joints = back.apply(tips), back.rotate(axes), back.apply(base), back.apply(joints)
         feet = {k: back.apply(foot) for k, foot in feet.items()}
     top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
-    lines = [(base[k], joints[:, k]) for k in range(robot.n_legs)]
+    lines = [(base[:, k], joints[:, k]) for k in range(joints.shape[1])]
     lines += [(joints[:, k], foot) for k, foot in feet.items()]
-    reaches = [OPTIONS.cap * comforts.leg_obstacle + bodies.leg_radius] * len(lines)
+    reaches = [OPTIONS.cap * comforts.leg_obstacle + float(bars.radii.max())] * len(lines)
     lines.append((tips + nose * axes, tips + top * axes))
     reaches.append(OPTIONS.cap * comforts.spindle_obstacle + bodies.shaft_radius)
     if tool:

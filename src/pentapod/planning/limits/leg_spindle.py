@@ -16,7 +16,7 @@ from pentapod.planning.limits.tool_pose import ToolPose
 
 @dataclass(frozen=True, kw_only=True)
 class LegSpindleClearance(LengthLimit):
-    """The gap between one leg and the spindle. side: of a leg beside the line, see `signed_leg_clearance`."""
+    """The gap between one bar and the spindle. side: of a leg beside the line, see `signed_leg_clearance`."""
 
     leg: int
     side: float = 0.0
@@ -25,14 +25,14 @@ class LegSpindleClearance(LengthLimit):
     def of(cls, scene: Scene) -> list[LegSpindleClearance]:
         """Return the gaps of all legs."""
         return [
-            cls(name=f"leg {k + 1} touches the spindle", leg=k, comfort=scene.comforts.tool, side=side_of(scene, k))
-            for k in range(scene.machine.robot.n_legs)
+            cls(name=f"{name} touches the spindle", leg=k, comfort=scene.comforts.tool, side=side_of(scene, k))
+            for k, name in enumerate(scene.machine.bars.names)
         ]
 
     def margin(self, pose: ToolPose) -> Any:
         """Return the margin of the gap."""
         machine, leg = pose.machine, self.leg
-        if not machine.robot.arms[leg] > 0.0:
+        if not machine.bars.beside[leg]:
             return leg_spindle_gap(machine, leg, pose.cosines[leg], pose.xp) / self.comfort
         top, nose = spindle_ends(machine)
         gap = beside_line(pose, leg, machine.tool_length - nose, machine.tool_length - top, self.side)
@@ -43,7 +43,7 @@ def side_of(scene: Scene, leg: int) -> float:
     """Return on which side a leg passes the line in the middle of the work volume; 0 for a leg that ends on it."""
     machine = scene.machine
     robot = machine.robot
-    if not robot.arms[leg] > 0.0:
+    if not machine.bars.beside[leg]:
         return 0.0
     direction = np.array([0.0, 0.0, float(scene.branch.w)])
     position = machine.work.centre - machine.tool_length * direction

@@ -15,7 +15,7 @@ from pentapod.planning.limits.tool_pose import ToolPose
 
 @dataclass(frozen=True, kw_only=True)
 class LegToolClearance(LengthLimit):
-    """The gap between one leg and the solids of shank and holder. side: see `LegSpindleClearance`."""
+    """The gap between one bar and the solids of shank and holder. side: see `LegSpindleClearance`."""
 
     leg: int
     solids: tuple[Solid, ...]
@@ -27,18 +27,18 @@ class LegToolClearance(LengthLimit):
         solids = scene.collision_world.tool
         return [
             cls(
-                name=f"leg {k + 1} touches the {TOOL_BODY}",
+                name=f"{name} touches the {TOOL_BODY}",
                 leg=k,
                 comfort=scene.comforts.tool,
                 solids=solids,
                 side=side_of(scene, k),
             )
-            for k in range(scene.machine.robot.n_legs if solids else 0)
+            for k, name in enumerate(scene.machine.bars.names if solids else ())
         ]
 
     def margin(self, pose: ToolPose) -> Any:
         """Return the margin of the gap."""
-        if pose.machine.robot.arms[self.leg] > 0.0:
+        if pose.machine.bars.beside[self.leg]:
             low, high, radius = widest_stretch(self.solids)
             gap = beside_line(pose, self.leg, low, high, self.side) - radius - pose.machine.bodies.leg_radius
             return gap / self.comfort

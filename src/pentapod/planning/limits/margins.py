@@ -27,6 +27,7 @@ from pentapod.planning.limits.leg_spindle import LegSpindleClearance
 from pentapod.planning.limits.leg_tool import LegToolClearance
 from pentapod.planning.limits.limit import Limit, LimitKind, Scene
 from pentapod.planning.limits.obstacles import ObstacleClearance
+from pentapod.planning.limits.passive_limb import limb_limits
 from pentapod.planning.limits.platform_joints import PlatformJointAngle
 from pentapod.planning.limits.singular_surfaces import SurfaceDistance
 from pentapod.planning.limits.strokes import LegStroke
@@ -42,6 +43,7 @@ LIMITS.register("strokes", LimitKind(LegStroke.of))
 LIMITS.register("singular surfaces", LimitKind(SurfaceDistance.of))
 LIMITS.register("base joints", LimitKind(BaseJointCone.of))
 LIMITS.register("platform joints", LimitKind(PlatformJointAngle.of))
+LIMITS.register("passive limb", LimitKind(limb_limits))
 LIMITS.register("leg pairs", LimitKind(LegPairClearance.of))
 LIMITS.register("leg and spindle", LimitKind(LegSpindleClearance.of))
 LIMITS.register("leg and tool", LimitKind(LegToolClearance.of))

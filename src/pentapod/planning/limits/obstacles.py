@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from pentapod.kinematics.legs_on_line import LegsOnLine
 from pentapod.planning.limits.contacts import NUMBERS, body_comforts
 from pentapod.planning.limits.limit import LengthLimit, Scene
 from pentapod.planning.limits.tool_pose import ToolPose, WorkpieceContacts
@@ -25,7 +26,7 @@ class ObstacleClearance(LengthLimit):
     def of(cls, scene: Scene) -> list[ObstacleClearance]:
         """Return the gaps of all bodies to the first obstacle, then to the next."""
         collision_world = scene.collision_world
-        bodies = list(zip(collision_world.names(scene.machine.robot.n_legs), body_comforts(scene), strict=True))
+        bodies = list(zip(collision_world.names(scene.machine), body_comforts(scene), strict=True))
         return [
             cls(
                 name=f"{name} touches the {obstacle.name}", comfort=comfort,
@@ -43,7 +44,7 @@ class ObstacleClearance(LengthLimit):
         s, *rest = contacts.numbers[NUMBERS * self.column : NUMBERS * (self.column + 1)]
         normal, point, radius = rest[:3], rest[3:6], rest[6]
         tip, axis = pose.tip, pose.axis
-        if self.body < len(pose.heights) and pose.machine.robot.arms[self.body] > 0.0:
+        if self.body < len(pose.heights) and not isinstance(pose.machine.robot, LegsOnLine):
             on_leg, on_arm = pose.xp.least(s, 1.0), pose.xp.most(s - 1.0, 0.0)
             start, leg, arm = pose.base(self.body), pose.vectors[self.body], pose.arm(self.body)
             x = [start[k] + on_leg * leg[k] + on_arm * arm[k] for k in range(3)]

@@ -54,25 +54,36 @@ class ToolPose:
 
     @cached_property
     def bases(self) -> Sequence[Vector]:
-        """The base joints (n_legs): two coordinates each where all lie in the base plane."""
-        return joints_of(self.machine.robot)[0] if self.joints is None else self.joints[0]
+        """Where the bars begin: two coordinates each where all lie in the base plane."""
+        bases, limb = joints_of(self.machine.robot)[0] if self.joints is None else self.joints[0], self.machine.limb
+        return bases if limb is None else [*bases, limb.foot_of(self.limb_end)]
 
     @cached_property
     def heights(self) -> Sequence[Any]:
-        """The heights (n_legs) of the platform joints along the line."""
-        return joints_of(self.machine.robot)[1] if self.joints is None else self.joints[1]
+        """The heights of the bars' platform joints along the line."""
+        heights, limb = joints_of(self.machine.robot)[1] if self.joints is None else self.joints[1], self.machine.limb
+        return heights if limb is None else [*heights, limb.joint]
 
     @cached_property
     def vectors(self) -> list[Vector]:
-        """The legs (n_legs) from base joint to platform joint."""
-        return self.machine.robot.vectors_of(self.position, self.direction, self.xp, self.joints)
+        """The bars, legs and then the passive limb, from base to platform."""
+        legs = self.machine.robot.vectors_of(self.position, self.direction, self.xp, self.joints)
+        if self.machine.limb is None:
+            return legs
+        return [*legs, [end - foot for end, foot in zip(self.limb_end, self.bases[-1], strict=True)]]
+
+    @cached_property
+    def limb_end(self) -> Vector:
+        """The universal joint of the passive limb."""
+        assert self.machine.limb is not None
+        return self.machine.limb.end_of(self.position, self.direction)
 
     def base(self, leg: int) -> Vector:
-        """Return the base joint of a leg, three components."""
+        """Return the base joint of a bar, three components."""
         return [*self.bases[leg], 0.0][:3]
 
     def joint(self, leg: int) -> Vector:
-        """Return the platform joint of a leg."""
+        """Return the platform joint of a bar."""
         base, vector = self.base(leg), self.vectors[leg]
         return [base[k] + vector[k] for k in range(3)]
 
@@ -86,16 +97,18 @@ class ToolPose:
         """The leg lengths (n_legs) as the controller reads them, metres: with the zeros of the scales."""
         robot = self.machine.robot
         zeros = robot.lengths_of([(0.0, 0.0, 0.0)] * robot.n_legs, NUMPY)
-        return [length + zero if zero else length for length, zero in zip(self.lengths, zeros, strict=True)]
+        return [
+            length + zero if zero else length for length, zero in zip(self.lengths[: robot.n_legs], zeros, strict=True)
+        ]
 
     @cached_property
     def lengths(self) -> list[Any]:
-        """The distances (n_legs) between the joints of each leg, metres."""
+        """The distances between the joints of each bar, metres."""
         return [self.xp.sqrt(dot(d, d)) for d in self.vectors]
 
     @cached_property
     def cosines(self) -> list[Any]:
-        """The cosines (n_legs) of the angles between legs and line, at the platform joints."""
+        """The cosines of the angles between bars and line, at the platform joints."""
         return [dot(d, self.direction) / length for d, length in zip(self.vectors, self.lengths, strict=True)]
 
     @cached_property

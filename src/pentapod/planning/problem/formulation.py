@@ -16,6 +16,7 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.arithmetic import Arithmetic
+from pentapod.kinematics.legs_on_line import LegsOnLine
 from pentapod.numerics.casadi_vectorised import Vectorised
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.limits.tool_pose import joints_of
@@ -97,10 +98,14 @@ def _legs(problem: PlacementProblem, margins: Margins, slopes: bool) -> Any:
 
     (step, a, *given), (tip, turned, _, _) = _pose(problem)
     robot, do = margins.scene.machine.robot, Arithmetic.casadi()
-    bases, heights = joints_of(robot)
-    # Heights from the tip along the tool axis, not from p along the platform line.
-    joints = bases, [margins.scene.machine.tool_length - z for z in heights]
-    vectors = robot.vectors_of(ca.vertsplit(tip), ca.vertsplit(turned), do, joints)
+    at, along = ca.vertsplit(tip), ca.vertsplit(turned)
+    if not isinstance(robot, LegsOnLine):  # where the joints are is told by the platform's own pose
+        length = margins.scene.machine.tool_length
+        vectors = robot.vectors_of([at[k] + length * along[k] for k in range(3)], [-x for x in along], do)
+    else:  # heights from the tip along the tool axis, not from p along the platform line
+        bases, heights = joints_of(robot)
+        joints = bases, [margins.scene.machine.tool_length - z for z in heights]
+        vectors = robot.vectors_of(at, along, do, joints)
     legs = ca.vertcat(*robot.lengths_of(vectors, do))
     wanted = [legs, ca.jacobian(legs, a)] if slopes else [legs]
     here = ca.substitute(wanted, [step], [ca.SX.zeros(6)])

@@ -31,15 +31,15 @@ _PROVEN = (
 )
 
 
-def claims(collision_world: CollisionWorld | None, legs: int) -> tuple[Claim, ...]:
-    """Return the claims for these surroundings of a machine with so many legs, in the order of the verdict."""
+def claims(collision_world: CollisionWorld | None, bars: int) -> tuple[Claim, ...]:
+    """Return the claims for these surroundings of a machine with so many bars, in the order of the verdict."""
     if collision_world is None:
         return ()
     made: list[Claim] = []
     if collision_world.tool:
         made.append(Claim(f"legs clear of the {TOOL_BODY}", partial(_legs_and_tool, tool=collision_world.tool)))
     for obstacle in collision_world.obstacles:
-        for title, columns in _groups(collision_world, legs):
+        for title, columns in _groups(collision_world, bars):
             judge = partial(_clear, obstacle=obstacle, collision_world=collision_world, columns=columns)
             made.append(Claim(f"{title} clear of the {obstacle.name}", judge))
     return tuple(made)
@@ -52,16 +52,16 @@ def surroundings_given(replay: Replay) -> Idle:
     return Idle("the surroundings (part, fixture, table) are not given", unknown=True)
 
 
-def _groups(collision_world: CollisionWorld, legs: int) -> tuple[tuple[str, list[int]], ...]:
-    tool = ((TOOL_BODY, [legs + 1]),) if collision_world.tool else ()
-    return (("legs", list(range(legs))), ("spindle", [legs]), *tool)
+def _groups(collision_world: CollisionWorld, bars: int) -> tuple[tuple[str, list[int]], ...]:
+    tool = ((TOOL_BODY, [bars + 1]),) if collision_world.tool else ()
+    return (("legs", list(range(bars))), ("spindle", [bars]), *tool)
 
 
 def _clear(replay: Replay, *, obstacle: Obstacle, collision_world: CollisionWorld, columns: list[int]) -> Finding:
     """Judge that some of the moving bodies do not touch one obstacle."""
-    machine, legs = replay.machine, replay.machine.robot.n_legs
+    machine, bars = replay.machine, len(replay.machine.bars.names)
     frame = replay.program.placement if obstacle.clamped else None
-    tool = collision_world.tool if legs + 1 in columns else ()
+    tool = collision_world.tool if bars + 1 in columns else ()
     bound = -obstacle.allowance if tool else 0.0
 
     def gaps(samples: Ints) -> Floats:
@@ -74,10 +74,10 @@ def _clear(replay: Replay, *, obstacle: Obstacle, collision_world: CollisionWorl
     offsets = line_offsets(machine, collision_world.tool)
 
     def approaches(displacement: Displacement) -> Floats:
-        return body_displacements(displacement, collision_world.tool, legs)[:, columns]
+        return body_displacements(displacement, collision_world.tool, bars)[:, columns]
 
     found = clearance_bound(replay, gaps, approaches, offsets, bound=bound)
-    name, far = collision_world.names(legs)[columns[found.column]], TOOL_FAR_M if tool else FAR_M
+    name, far = collision_world.names(machine)[columns[found.column]], TOOL_FAR_M if tool else FAR_M
     if found.gap > bound and _enclosed(replay, obstacle, frame, columns):
         return Finding(False, None, MM * bound, "mm", replay.place(0), f"{name} is inside the {obstacle.name}")
     method = f"{name} comes closest; exact distance of its body from the mesh, {_PROVEN}"
@@ -93,19 +93,19 @@ def _clear(replay: Replay, *, obstacle: Obstacle, collision_world: CollisionWorl
 
 def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
     """Judge that no leg touches shank or holder."""
-    machine, legs = replay.machine, replay.machine.robot.n_legs
+    machine, bars = replay.machine, replay.machine.bars.names
 
     def gaps(samples: Ints) -> Floats:
         position, direction = (x[samples] for x in replay.pose)
         return leg_tool_gaps(machine, tool, position, direction)
 
     def approaches(displacement: Displacement) -> Floats:
-        both = body_displacements(displacement, tool, legs)
-        return both[:, :legs] + both[:, legs + 1 :]
+        both = body_displacements(displacement, tool, len(bars))
+        return both[:, : len(bars)] + both[:, len(bars) + 1 :]
 
     found = clearance_bound(replay, gaps, approaches, line_offsets(machine, tool))
     method = (
-        f"leg {found.column + 1} comes closest; distance of its body from shank and holder in the plane of leg and "
+        f"{bars[found.column]} comes closest; distance of its body from shank and holder in the plane of leg and "
         f"tool axis, {_PROVEN}"
     )
     return Finding(found.gap > 0.0, MM * found.gap, 0.0, "mm", replay.place(found.sample), method)
@@ -114,20 +114,23 @@ def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
 def line_offsets(machine: Machine, tool: tuple[Solid, ...]) -> Floats:
     """Return the offsets along the platform line of joints, ends of the spindle, ends of the tool body, metres."""
     ends = [machine.tool_length - height for solid in tool for height in (solid.low, solid.high)]
-    return np.array([*machine.robot.offsets, *spindle_ends(machine), *([min(ends), max(ends)] if ends else [])])
+    return np.array([*machine.bars.offsets, *spindle_ends(machine), *([min(ends), max(ends)] if ends else [])])
 
 
-def body_displacements(displacement: Displacement, tool: tuple[Solid, ...], legs: int) -> Floats:
-    """Return bounds (n, K) on the displacement of the bodies; points of a leg move no more than its platform joint.
+def body_displacements(displacement: Displacement, tool: tuple[Solid, ...], bars: int) -> Floats:
+    """Return bounds (n, K) on the displacement of the bodies; points of a bar move no more than its platform joint.
 
-    Of a leg with an arm: no more than its platform joint and the arm's foot.
+    Of a leg with an arm: no more than its platform joint and the arm's foot. The passive limb's foot on its rail moves
+    less than its platform joint.
     """
-    line = displacement.points
-    joints = line[:, :legs] if displacement.joints is None else np.maximum(line[:, :legs], displacement.joints)
-    moved = [joints, line[:, legs : legs + 2].max(axis=1, keepdims=True)]
+    line, joints = displacement.points, displacement.points[:, :bars].copy()
+    if displacement.joints is not None:
+        legs = displacement.joints.shape[1]
+        joints[:, :legs] = np.maximum(joints[:, :legs], displacement.joints)
+    moved = [joints, line[:, bars : bars + 2].max(axis=1, keepdims=True)]
     if tool:
         wide = max(solid.largest_radius for solid in tool)
-        moved.append((line[:, legs + 2 :].max(axis=1) + wide * displacement.turn)[:, None])
+        moved.append((line[:, bars + 2 :].max(axis=1) + wide * displacement.turn)[:, None])
     return np.concatenate(moved, axis=1)
 
 

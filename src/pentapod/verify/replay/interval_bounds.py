@@ -167,7 +167,7 @@ def _chords(
 
     The points are the tip, the tilt centre, and both ends of the platform's line with the tool.
     """
-    tip, heights = machine.tool_length, machine.robot.offsets
+    tip, heights = machine.tool_length, machine.bars.offsets
     halves = split(part.bernstein)
     legs = np.stack(halves, axis=1).reshape(-1, *part.bernstein.shape[1:])
     start, end = between, slice(between.start + 1, between.stop + 1)
