@@ -25,7 +25,7 @@ from pentapod.kinematics.arithmetic import NUMPY
 from pentapod.kinematics.mode import Mode
 from pentapod.kinematics.platforms.constrained import ConstrainedPlatform
 from pentapod.machine import Machine, clearances, sample_work_volume
-from pentapod.machine.passive_limb import PassiveLimb
+from pentapod.machine.bars import PassiveLimb
 from pentapod.planning.limits.leg_pairs import LegPairClearance
 from pentapod.planning.limits.leg_spindle import LegSpindleClearance
 from pentapod.planning.limits.margins import Margins
@@ -93,11 +93,9 @@ def figures(machine: Machine, around: int, levels: int) -> dict[str, float]:
 def signed_gaps(machine: Machine, mode: Mode, tips: np.ndarray, axes: np.ndarray) -> float:
     """Return the least gap as the planner sees it, metres: negative where legs change sides, as if they had crossed."""
     margins = Margins.of(machine, mode)
-    gaps = [
-        k for k, limit in enumerate(margins.own_limits) if isinstance(limit, LegPairClearance | LegSpindleClearance)
-    ]
-    comforts = [margins.own_limits[k].comfort for k in gaps]
-    return float((margins.own(tips, axes)[:, gaps] * comforts).min())
+    limits = enumerate(margins.own_limits)
+    gaps = {k: limit.comfort for k, limit in limits if isinstance(limit, LegPairClearance | LegSpindleClearance)}
+    return float((margins.own(tips, axes)[:, list(gaps)] * list(gaps.values())).min())
 
 
 def limb_figures(limb: PassiveLimb, p: np.ndarray, i: np.ndarray) -> tuple[float, float]:

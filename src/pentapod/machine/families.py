@@ -13,8 +13,8 @@ from pentapod.base.registry import Registry
 from pentapod.base.tables import TomlTable, wrong
 from pentapod.base.values import Value
 from pentapod.kinematics.robot import Robot
+from pentapod.machine.bars import PassiveLimb
 from pentapod.machine.fields import LEG_NUMBERS, LEG_PAIRS, LEGS
-from pentapod.machine.passive_limb import PassiveLimb
 
 QUADRATIC, GENERAL, PENTAKINS, HEXA, SPR, PRPU = "quadratic", "general", "pentakins", "hexa", "4-ups-spr", "5-ups-prpu"
 

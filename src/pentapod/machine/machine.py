@@ -18,14 +18,13 @@ from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.kinematics.robot import Robot
 from pentapod.machine import reader
-from pentapod.machine.bars import Bars
+from pentapod.machine.bars import Bars, PassiveLimb
 from pentapod.machine.calibration.digest import digest_of
 from pentapod.machine.calibration.record import CalibrationRecord
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.fields import for_legs, positive
 from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
-from pentapod.machine.passive_limb import PassiveLimb
 
 ARCHITECTURAL_LIMIT = 0.005
 """Least `conditioning` of a machine's robot: below it, some motion hardly changes the leg lengths."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pentapod.machine.bars import PassiveLimb
 from pentapod.machine.machine import Machine
-from pentapod.machine.passive_limb import PassiveLimb
 
 CYLINDER_SHARE = 0.9
 """Length of a leg's fixed part as a share of the shortest leg."""

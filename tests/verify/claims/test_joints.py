@@ -56,5 +56,5 @@ def test_a_bound_beyond_a_cosine_is_the_straight_angle():
     assert platform_least(over).value == 0.0
 
 
-def test_all_of_them_are_proven_for_all_times():
-    assert [claim.needs_proof for claim in CLAIMS] == [True, True, True]
+def test_angles_of_the_legs_are_proven_for_all_times():
+    assert [claim.needs_proof for claim in CLAIMS[:3]] == [True, True, True]

@@ -8,7 +8,7 @@ import replay_cases as cases
 
 from pentapod.machine import Machine
 from pentapod.verify import Replay, Specification
-from pentapod.verify.claims.passive_limb import within_ranges
+from pentapod.verify.claims.joints import within_ranges
 from pentapod.verify.replay.claim import Idle
 from short_motion import loop
 

@@ -9,9 +9,9 @@ from pydantic import Field
 
 from pentapod.base.errors import MachineError
 from pentapod.kinematics.platforms.constrained import ConstrainedPlatform
+from pentapod.machine.bars import PassiveLimb
 from pentapod.machine.families import Family
 from pentapod.machine.fields import LEG_PAIRS, LIST_OF_2
-from pentapod.machine.passive_limb import PassiveLimb
 from pentapod.machine.robots.spr import SprTable, platform_joints
 
 

@@ -7,24 +7,23 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.machine.passive_limb import PassiveLimb
+from pentapod.machine.bars import PassiveLimb
 from pentapod.planning.limits.limit import CosineLimit, LengthLimit, Limit, Scene
 from pentapod.planning.limits.tool_pose import ToolPose
 
 
 @dataclass(frozen=True, kw_only=True)
 class LimbTravel(LengthLimit):
-    """One end of the rail, or of the strut's stroke. end: metres there; half of the way counts as margin 1."""
+    """One end of the limb's rail, or of its strut's stroke. end: metres there; half of the way counts as margin 1."""
 
+    limb: PassiveLimb
     end: float
     sign: float
     strut: bool
 
     def margin(self, pose: ToolPose) -> Any:
         """Return the share of half the way that is left."""
-        limb = pose.machine.limb
-        assert limb is not None
-        at = pose.lengths[-1] if self.strut else limb.place_of(pose.limb_end)
+        at = pose.lengths[-1] if self.strut else self.limb.place_of(self.limb.end_of(pose.position, pose.direction))
         return self.sign * (at - self.end) / self.comfort
 
 
@@ -51,7 +50,9 @@ def _travels(limb: PassiveLimb) -> list[Limit]:
     ):
         half = 0.5 * float(ends[1] - ends[0])
         for name, end, sign in zip(words, ends.tolist(), (1.0, -1.0), strict=True):
-            found.append(LimbTravel(name=name, comfort=half, group="strokes", end=end, sign=sign, strut=strut))
+            found.append(
+                LimbTravel(limb=limb, name=name, comfort=half, group="strokes", end=end, sign=sign, strut=strut)
+            )
     return found
 
 

@@ -56,7 +56,7 @@ class ToolPose:
     def bases(self) -> Sequence[Vector]:
         """Where the bars begin: two coordinates each where all lie in the base plane."""
         bases, limb = joints_of(self.machine.robot)[0] if self.joints is None else self.joints[0], self.machine.limb
-        return bases if limb is None else [*bases, limb.foot_of(self.limb_end)]
+        return bases if limb is None else [*bases, limb.foot_of(limb.end_of(self.position, self.direction))]
 
     @cached_property
     def heights(self) -> Sequence[Any]:
@@ -70,13 +70,8 @@ class ToolPose:
         legs = self.machine.robot.vectors_of(self.position, self.direction, self.xp, self.joints)
         if self.machine.limb is None:
             return legs
-        return [*legs, [end - foot for end, foot in zip(self.limb_end, self.bases[-1], strict=True)]]
-
-    @cached_property
-    def limb_end(self) -> Vector:
-        """The universal joint of the passive limb."""
-        assert self.machine.limb is not None
-        return self.machine.limb.end_of(self.position, self.direction)
+        end = self.machine.limb.end_of(self.position, self.direction)
+        return [*legs, [end[k] - self.bases[-1][k] for k in range(3)]]
 
     def base(self, leg: int) -> Vector:
         """Return the base joint of a bar, three components."""
