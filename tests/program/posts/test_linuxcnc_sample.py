@@ -13,6 +13,7 @@ from linuxcnc_runs import play, real
 from pentapod import Job, Machine
 from pentapod import run as run_job
 from pentapod.cli.main import run
+from pentapod.job.measuring.measuring import plan_measuring
 from pentapod.planning import PlacedPath
 from pentapod.program import Program
 
@@ -52,6 +53,12 @@ def test_installed_sample_is_the_one_that_is_known_here(tmp_path) -> None:
     np.testing.assert_allclose(machine.tool_length - machine.robot.offsets, [1e-3 * row[3] for row in ROWS])
     assert (machine.robot.radii == 0.0803).all()
     assert (machine.legs.max_velocity == 0.1).all()
+
+
+@pytest.mark.slow
+def test_measuring_of_the_sample_is_planned_and_passes(tmp_path) -> None:
+    made = plan_measuring(imported(tmp_path), tmp_path / "poses", 20).unwrap()
+    assert made.verdict.passed, [claim for claim in made.verdict.certificates if not claim.passed]
 
 
 @pytest.mark.slow

@@ -48,12 +48,13 @@ NO_PART = (
 class MeasuringOptions:
     """dwell: seconds of rest in each pose. path_tolerance, axis_tolerance: of the ways, metres and radians.
 
-    axis_step: largest turn of the tool between waypoints, radians. random: draws of as many poses by chance, with which
+    The verdict proves the program for legs that are off by the path tolerance: a wide one proves nothing on machines
+    on which small errors of the legs move the tip far. axis_step: largest turn of the tool between waypoints, radians. random: draws of as many poses by chance, with which
     the choice is compared.
     """
 
     dwell: float = 5.0
-    path_tolerance: float = 1e-4
+    path_tolerance: float = 5e-6
     axis_tolerance: float = 2e-3
     axis_step: float = 0.05
     random: int = 50
