@@ -49,8 +49,8 @@ class MeasuringOptions:
     """dwell: seconds of rest in each pose. path_tolerance, axis_tolerance: of the ways, metres and radians.
 
     The verdict proves the program for legs that are off by the path tolerance: a wide one proves nothing on machines
-    on which small errors of the legs move the tip far. axis_step: largest turn of the tool between waypoints, radians. random: draws of as many poses by chance, with which
-    the choice is compared.
+    on which small errors of the legs move the tip far. axis_step: largest turn of the tool between waypoints, radians.
+    random: draws of as many poses by chance, with which the choice is compared.
     """
 
     dwell: float = 5.0
