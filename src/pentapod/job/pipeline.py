@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from pentapod.base.errors import ToolpathError
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal
 from pentapod.job.advice.options import OPTIONS, AdviceOptions
@@ -19,6 +20,7 @@ from pentapod.job.build.pieces import job_part, job_piece, job_without
 from pentapod.job.build.region import covers_region
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import Reports, job_link_style, job_toolpath
+from pentapod.job.build.upright import may_stand, upright
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.mending import OPTIONS as MENDING
 from pentapod.job.mending import mend_of, most_left_out
@@ -38,8 +40,18 @@ from pentapod.timing import Limit
 from pentapod.toolpath import Mesh, Toolpath
 from pentapod.toolpath.linking.partition import Piece, missed_cuts
 from pentapod.verify import Claim, Verdict, judged
+from pentapod.verify.surface.surface_left import SURFACE_LEFT
 
 Writer = Callable[[Outcome, Path], object]
+
+TOUCHES = ("tool body", "the tool touches")
+"""Beginnings of the names of limits and claims that say that shank or holder touch the part."""
+
+STANDS = (
+    "went back: the tool stays upright, and passes end where the part leans over them, since no lean that was found "
+    "keeps it clear of the part"
+)
+"""What is said of a job that is done by an upright tool."""
 
 
 def run(
@@ -69,6 +81,8 @@ def run(
     """
     folder = Path(out)
     check_folder(folder)
+    if before is not None and before.upright and may_stand(job):
+        job = upright(job)
     runner = StageRunner(progress)
     with staged(folder) as staging:  # from the start: a second run on the folder fails at once
         used, own_machine = job_machine(job, machine), machine is not None
@@ -85,6 +99,8 @@ def run(
         alone = piece is None and before is None and job.placement.setups == 1
         if outcome.refusal is not None and alone and covers_region(job):
             outcome = _mended(task, mesh, outcome, staging, writers or {})
+            if may_stand(job) and _touches(outcome):
+                outcome = _upright(task, mesh, outcome, staging, writers or {})
         refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
         if refusal is not None and refusal.stage == "placement" and splits:
             outcome = _split(task, mesh, refusal, staging, writers or {})
@@ -202,9 +218,46 @@ def _mended(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Map
     return _written(task, failed.verdict, staging, writers)
 
 
+def _touches(outcome: Outcome) -> bool:
+    """Return whether a run failed since shank or holder touch the part."""
+    limits = () if outcome.refusal is None else [each.constraint for each in outcome.refusal.diagnosis]
+    return any(name.startswith(TOUCHES) for name in (*limits, *failures(outcome.verdict)))
+
+
+def _upright(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+    """Go back after a placement at which the tool touches the part, and plan the job with an upright tool.
+
+    Returns the failed outcome where that does not pass.
+    """
+    job, runner, file = upright(task.job), StageRunner(task.runner.progress), staging / WITHHELD
+    first = file.read_bytes() if file.is_file() else None
+    runner.stages += [stage for stage in task.runner.stages if stage.name == "mesh"]
+    runner.stages.append(Stage("upright", 0.0, None, STANDS))
+    own_machine = task.specification.sources.machine is None
+    make = partial(_toolpath, job, task.machine, mesh, None, runner, None)
+    try:
+        specification = job_specification(job, task.machine, mesh, make, own_machine=own_machine)
+    except ToolpathError:  # no cut is left
+        return failed
+    again = dataclasses.replace(task, job=job, specification=specification, runner=runner)
+    file.unlink(missing_ok=True)
+    outcome = _planned(again, staging, writers)
+    if not outcome.passed:
+        outcome = _mended(again, mesh, outcome, staging, writers)
+    if outcome.passed:
+        left = next(each.method for each in outcome.verdict.certificates if each.claim == SURFACE_LEFT)
+        runner.stages.append(Stage("left", 0.0, None, f"{SURFACE_LEFT}: {left.rsplit('; ', 1)[-1]}"))
+        task.runner.stages = runner.stages
+        return _written(again, outcome.verdict, staging, writers)
+    file.unlink(missing_ok=True)
+    if first is not None:
+        file.write_bytes(first)
+    return _written(task, failed.verdict, staging, writers)
+
+
 def _written(task: Task, verdict: Verdict, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
     """Write the files of a run but its program, and return the outcome."""
-    outcome = Outcome(task.job, task.machine, tuple(task.runner.stages), verdict)
+    outcome = Outcome(task.job.asked or task.job, task.machine, tuple(task.runner.stages), verdict)
     if (placed := outcome.find(PlacedPath)) is not None:
         outcome = dataclasses.replace(outcome, machine=task.on(placed.placement).machine)
     write_arrays(arrays_of(outcome, unstaged(staging)), staging / ARRAYS)

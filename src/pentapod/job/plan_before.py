@@ -61,7 +61,8 @@ class PlanBefore(Value):
     """A run whose part is found elsewhere. job_file: of the run; placement: workpiece → machine.
 
     tips, axes (N, 3): of the tool, workpiece frame, axes unit. toolpath: as it was made; job_digest: of the job then.
-    left_out: pairs of waypoints of the job's toolpath between which it makes no cut.
+    left_out: pairs of waypoints of the job's toolpath between which it makes no cut. upright: whether the tool stands
+    along the view, though the job lets it lean.
     """
 
     job_file: Path
@@ -73,6 +74,7 @@ class PlanBefore(Value):
     toolpath: Toolpath
     job_digest: str
     left_out: tuple[tuple[int, int], ...] = ()
+    upright: bool = False
 
     @classmethod
     def of(cls, folder: Path) -> PlanBefore:
@@ -102,7 +104,7 @@ class PlanBefore(Value):
         tips, axes = back.apply(to_si(arrays["placed.tips_mm"], "mm")), back.rotate(arrays["placed.axes"])
         job = folder / str(arrays[JOB_FILE])
         made_from, toolpath = read_header(folder / PROGRAM).provenance, read_toolpath(file, "npz")
-        branch, then = Component(w, s), (made_from.job_digest, made_from.left_out)
+        branch, then = Component(w, s), (made_from.job_digest, made_from.left_out, made_from.upright)
         return cls(job, placement, branch, tips, axes, _laws(arrays), toolpath, *then)
 
     def placed(

@@ -204,7 +204,7 @@ class Task:
         machine = self.machine
         source = Provenance(
             machine.name, machine.digest, self.job.digest, __version__, self.piece, *made_on,
-            calibration=machine.calibration_name, left_out=self.left_out,
+            calibration=machine.calibration_name, left_out=self.left_out, upright=self.job.asked is not None,
         )  # fmt: skip
         program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
         write_csv(program, file)

@@ -54,11 +54,13 @@ COMMANDS = "commands"
 """Key of files in which the rows are what drives are told, by a machine's leg model."""
 LEFT_OUT = "left_out"
 """Key of programs that leave cuts of the toolpath out: pairs of waypoints."""
+UPRIGHT = "upright"
+"""Key of programs whose tool stands along the view, though their job lets it lean."""
 LEGS = "legs"
 """Key of programs for machines that have not as many legs as a linear pentapod."""
 MADE_ON = ("processor", "libraries")
 """Keys of planned programs: on another kind of processor or with other libraries bits may differ."""
-OPTIONAL_KEYS = (LEGS, CALIBRATION, COMMANDS, GUIDES, *SETUP_KEYS, LEFT_OUT, *MADE_ON)
+OPTIONAL_KEYS = (LEGS, CALIBRATION, COMMANDS, GUIDES, *SETUP_KEYS, LEFT_OUT, UPRIGHT, *MADE_ON)
 UNVERIFIED = "UNVERIFIED: no verdict has passed this program"
 """First line, after the comment mark, of files written for a controller without a passed verdict."""
 LARGEST_COUNT = 2**63 - 1
@@ -112,6 +114,8 @@ def header_text(program: Program) -> str:
         values |= {WAYPOINTS: f"[{source.piece.first}, {source.piece.last}]", BOX: box_text(source.piece)}
     if source.left_out:
         values[LEFT_OUT] = f"[{', '.join(f'[{first}, {last}]' for first, last in source.left_out)}]"
+    if source.upright:
+        values[UPRIGHT] = "true"
     made_on = zip(MADE_ON, (source.processor, source.libraries), strict=True)
     values |= {key: string_text(value) for key, value in made_on if value}
     mark = f"# {UNVERIFIED}\n" if source.unverified else ""
@@ -183,6 +187,7 @@ class _Reader:
                 pentapod_version=self._text("pentapod_version"),
                 piece=self._piece(),
                 left_out=self._left_out(),
+                upright=self._upright(),
                 unverified=self.unverified,
                 **{key: self._text(key) for key in (*MADE_ON, CALIBRATION, COMMANDS) if key in self.values},
             ),
@@ -250,6 +255,11 @@ class _Reader:
         good = good and flat == sorted(set(flat)) and flat[0] >= 0 and flat[-1] <= LARGEST_COUNT
         self._check(LEFT_OUT, good, "pairs of increasing waypoints, [[first, last], ...]")
         return tuple((first, last) for first, last in pairs)
+
+    def _upright(self) -> bool:
+        if UPRIGHT in self.values:
+            self._check(UPRIGHT, self.values[UPRIGHT] is True, "true, or no such line")
+        return UPRIGHT in self.values
 
     def _rows(self) -> int:
         rows = self.values["rows"]

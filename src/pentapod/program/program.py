@@ -29,7 +29,9 @@ class Provenance(Value):
     piece: of the toolpath, where the program is one of several set-ups. processor, libraries: with which it was made;
     with the same ones it is the same to the bit. unverified: it was written for a controller without a passed verdict.
     calibration: name of the machine's calibration, "" where there is none. commands: digest of the leg model by which
-    the rows are commands of drives; "" where they are readings of the legs.
+    the rows are commands of drives; "" where they are readings of the legs. left_out: pairs of waypoints of the job's
+    toolpath between which it makes no cut. upright: whether the tool stands along the view, though the job lets it
+    lean.
     """
 
     machine: str
@@ -43,6 +45,7 @@ class Provenance(Value):
     calibration: str = ""
     commands: str = ""
     left_out: tuple[tuple[int, int], ...] = ()
+    upright: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,9 @@ import pytest
 import replay_cases as cases
 
 from pentapod.base.errors import ArrayError
+from pentapod.geometry.polyline import arc_length
 from pentapod.verify import verify
+from pentapod.verify.claims.slowness import unasked_stop
 
 FEED, STOP = "lowest feed", "no unasked stop"
 
@@ -110,3 +112,55 @@ def test_a_dwell_is_as_long_as_it_is_asked(linear, dwell, passed):
     segments[1] = replace(segments[1], dwell=dwell)
     asked = replace(linear, toolpath=replace(linear.toolpath, segments=tuple(segments)))
     assert judged(asked, standing(linear, ends_of_strokes()[1], 0.5))[STOP].passed is passed
+
+
+REVERSAL = 6
+"""The stroke that goes down to where the next one turns back."""
+
+SLOW_ROWS = 12
+"""Rows after a stop that count as rest, too."""
+
+
+def turning_back(short, seconds):
+    """A program that turns back `short` metres before the reversal, and rests there; and its rows at rest."""
+    parts = cases.strokes()
+    (above, there), axes = parts[REVERSAL].pose(np.array([0.0, 1.0]))
+    low = there + short * (above - there) / np.linalg.norm(above - there)
+    back = parts[REVERSAL + 1].pose(np.array([0.0, 1.0]))[0][1]
+    parts[REVERSAL] = cases.straight(parts[REVERSAL].kind, np.inf, above, low, axes[1])
+    parts[REVERSAL + 1] = cases.straight(parts[REVERSAL].kind, np.inf, low, back, axes[1])
+    row = len(cases.timed(parts[: REVERSAL + 1])[0]) - 1
+    program = cases.program_of(cases.STAND, *cases.timed(parts), interpolation="linear")
+    rows = round(seconds / cases.PERIOD)
+    legs = np.insert(program.legs, row, np.repeat(program.legs[row : row + 1], rows, axis=0), axis=0)
+    return replace(program, legs=legs), np.arange(row, row + rows + 1)
+
+
+def lagging(case, program, rows, lag):
+    """The replay of a program whose matching holds its rows `lag` metres before the reversal."""
+    replay = cases.replay_of(case, program)
+    end = arc_length(case.toolpath.tilt_centres)[case.toolpath.starts[REVERSAL + 1]]
+    arcs = replay.match.arcs.copy()
+    still = 2 * (rows[-1] + SLOW_ROWS)
+    arcs[:still] = np.minimum(arcs[:still], end - lag)
+    replay.__dict__["match"] = replace(replay.match, arcs=arcs)
+    return replay
+
+
+def test_a_rest_at_a_reversal_is_asked_for_however_far_the_matching_lags(linear):
+    """A matching may hold any row a little farther from its place than the path tolerance."""
+    tolerance = cases.TOLERANCES["path_tolerance"]
+    program, rows = turning_back(tolerance, 0.03)
+    assert judged(linear, program)[STOP].passed
+    assert unasked_stop(lagging(linear, program, rows, 1.0005 * tolerance)).passed
+    beyond = unasked_stop(lagging(linear, program, rows, 3.0 * tolerance))
+    assert not beyond.passed
+    assert beyond.value == pytest.approx(0.03, abs=8e-3)
+
+
+def test_a_rest_above_a_reversal_is_an_unasked_stop(linear):
+    program, _ = turning_back(0.0, 0.0)
+    row = ends_of_strokes()[REVERSAL - 1] + 20
+    found = judged(linear, standing(replace(linear, program=program), row, 0.03))[STOP]
+    assert not found.passed
+    assert found.value == pytest.approx(0.03, abs=5e-3)

@@ -156,6 +156,22 @@ def test_a_floor_that_the_view_sees_must_be_cut_up_to_a_ledge_and_no_farther():
     assert short.value == pytest.approx(100.0 * (reached - 2e-3) / 0.02, rel=0.1)
 
 
+def test_what_a_leaning_tool_might_reach_under_a_ledge_is_told_where_the_tool_stays_upright():
+    """Under a ledge of 12 mm, 4 mm above the floor, a lean of 45 degrees leads out of the outer 4 mm alone."""
+    left, floor = 0.25e-3, Region(box=((0.0, 0.0145, -1e-3), (0.02, 0.0155, 1e-3)), angle=0.5)
+    part, out = ledge(12e-3, 4e-3), 12e-3
+    told = judged(floor_lines(out + R), part, BALL, left, region=floor, leans=np.radians(45.0))
+    assert told.passed
+    assert told.value == 0.0
+    share = float(told.method.split(" deg might reach ")[1].split(" %")[0])
+    assert share == pytest.approx(100.0 * (4e-3 - left) / 0.02, rel=0.1)
+    assert "might reach" not in judged(floor_lines(out + R), part, BALL, left, region=floor).method
+    # A pass that is taken away where the upright tool reaches is missed as ever.
+    short = judged(floor_lines(out + R + 2e-3), part, BALL, left, region=floor, leans=np.radians(45.0))
+    assert not short.passed
+    assert short.value > 5.0
+
+
 def test_a_wall_that_leans_under_must_be_cut_as_far_down_as_a_ball_from_above_comes_near():
     """It leans by 3 degrees under its upper edge; a quarter of what may be left hides nothing."""
     high, left = 0.01, 0.2e-3

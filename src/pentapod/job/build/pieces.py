@@ -8,6 +8,7 @@ from pathlib import Path
 from pentapod.base.errors import InputError, ProgramError
 from pentapod.base.progress import Progress, silent
 from pentapod.job.build.toolpath import drops_gouges, gouge_options, job_link_style, job_toolpath, judged_tool
+from pentapod.job.build.upright import may_stand, upright
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
@@ -67,6 +68,7 @@ def program_toolpath(
     made_from = _provenance(program)
     if made_from is not None and made_from.piece is not None:
         return job_piece(job, mesh, made_from.piece, progress, machine=machine)
+    job = job_of_program(job, program)
     toolpath = job_toolpath(job, mesh, progress, machine=machine)[0]
     if made_from is None or not made_from.left_out:
         return toolpath
@@ -79,6 +81,12 @@ def program_toolpath(
             remedy="plan the job again",
         )  # fmt: skip
     return job_without(job, mesh, toolpath, made_from.left_out, machine=machine)
+
+
+def job_of_program(job: Job, program: Path) -> Job:
+    """Return the job as a program file does it: with an upright tool, where its header says so and the job lets it."""
+    made_from = _provenance(program)
+    return upright(job) if made_from is not None and made_from.upright and may_stand(job) else job
 
 
 def program_piece(program: Path) -> Piece | None:

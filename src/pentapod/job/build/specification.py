@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from hashlib import sha256
+
+import numpy as np
 
 from pentapod.base.errors import InputError, MachineError
 from pentapod.base.files import sha256_of
@@ -22,6 +25,9 @@ from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify import Coverage, Cutting, Specification
 from pentapod.verify.verdict.verdict import Sources
+
+LEANS = float(np.radians(45.0))
+"""How far from the view a tool might lean on any machine: what only such a lean reaches is told."""
 
 
 def job_specification(
@@ -89,7 +95,10 @@ def job_cutting(job: Job, collision_world: CollisionWorld, machine: Machine | No
         if obstacle.name == "part":
             mesh = obstacle.surface.mesh
             solids = job_tool(job, machine).solids
-            return Cutting(obstacle.surface, solids, depth, job_coverage(job, mesh, machine))
+            coverage = job_coverage(job, mesh, machine)
+            if job.asked is not None:  # an upright tool where the job lets it lean
+                coverage = replace(coverage, leans=LEANS)
+            return Cutting(obstacle.surface, solids, depth, coverage)
     return None
 
 
@@ -131,6 +140,6 @@ def _sources(job: Job, *, own_machine: bool) -> Sources:
 def _job_file(job: Job) -> str | None:
     """Return the SHA-256 of a job's file; None where the file says something else than the job."""
     try:
-        return sha256_of(job.path) if Job.load(job.path).tables == job.tables else None
+        return sha256_of(job.path) if Job.load(job.path).tables == (job.asked or job).tables else None
     except (InputError, OSError):
         return None

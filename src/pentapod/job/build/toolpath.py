@@ -48,6 +48,10 @@ RATE_SLACK = 1.05
 """Factor on the cap of the axis's turn: it holds along the contact points, not along the tilt centres."""
 
 
+BESIDE = 0.2
+"""Share of the gouge tolerance that is kept for a motion beside the path."""
+
+
 @dataclass(frozen=True)
 class Reports:
     """The reports of the steps that made a toolpath."""
@@ -90,7 +94,8 @@ def judged_tool(job: Job, machine: Machine | None) -> Tool:
     """Return the tool that the toolpath is made for and judged with.
 
     Where the planner chooses the axes, that is the ball alone: it is at the same place whatever the axis. The planner
-    keeps the rest of the tool clear of the part. Else shank and holder are larger, by the room that the planner needs.
+    keeps the rest of the tool clear of the part. Else shank and holder are larger, by the room that the planner needs
+    and by what the motion may be beside the path, up to a share BESIDE of the gouge tolerance.
     """
     tool = job_tool(job, machine)
     if job.axis.mode == "auto" and isinstance(tool, BallEnded):
@@ -99,7 +104,8 @@ def judged_tool(job: Job, machine: Machine | None) -> Tool:
     if not body or not isinstance(tool, Mounted):
         return tool
     needed = NEEDED_MARGIN * tool_comfort(body, job.gouge.si.tolerance + job_depth(job), Comforts())
-    return cast(Any, dataclasses.replace(tool, reserve=needed + TOOL_RESOLUTION_M + RESOLUTION_M))
+    room = needed + min(job.tolerance.si.path, BESIDE * job.gouge.si.tolerance)
+    return cast(Any, dataclasses.replace(tool, reserve=room + TOOL_RESOLUTION_M + RESOLUTION_M))
 
 
 def tool_in_world(job: Job, machine: Machine | None = None) -> Tool:

@@ -42,7 +42,8 @@ class Job(Value):
     """Content of a job file. Values are as in the file; each table has them in SI units as well: `job.feed.si.cut`.
 
     path: the job file; for a job from values, a name in its folder. mesh_path, fixture_mesh, machine_file and files (by
-    their keys in [toolpath]): resolved against its folder. from_file: whether the job is that of its file.
+    their keys in [toolpath]): resolved against its folder. from_file: whether the job is that of its file. asked: the
+    job as its file says it, where this one is another way to do it; its digest counts.
     """
 
     summary = ("path",)
@@ -54,6 +55,7 @@ class Job(Value):
     files: dict[str, Path] = field(default_factory=dict[str, Path])
     fixture_mesh: Path | None = None
     from_file: bool = field(default=True, compare=False)
+    asked: Job | None = field(default=None, compare=False)
 
     part = _TableOf()
     machine = _TableOf()
@@ -151,6 +153,8 @@ class Job(Value):
         Comments, order of keys and folders of files do not change it; nor does [verify], which does not affect the
         program.
         """
+        if self.asked is not None:
+            return self.asked.digest
         content = self.tables.model_dump(mode="json", exclude={"verify"})
         if not self.limits.use:
             del content["limits"]

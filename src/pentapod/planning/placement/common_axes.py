@@ -39,7 +39,9 @@ class CommonAxesOptions:
     them are judged with the tilt field. waypoints: number that represents the path where the placements are given.
     starts: of the search of each candidate, the most promising one first, then a fixed axis; so many are searched,
     except those whose first guess is no better than what was found. Until a candidate fits, up to `most` are searched,
-    each with up to twice the starts. own: whether the path's own axes are a candidate.
+    each with up to twice the starts. room: expected margin of shank and holder below which only the most promising
+    candidate is searched: at some waypoint they touch at every lean that was tried. own: whether the path's own axes
+    are a candidate.
     """
 
     tilt: float = float(np.radians(15.0))
@@ -53,6 +55,7 @@ class CommonAxesOptions:
     waypoints: int = 48
     starts: tuple[int, ...] = (3, 2)
     most: int = 4
+    room: float = 0.0
     own: bool = True
 
 
@@ -98,6 +101,8 @@ def with_common_axis(
             continue
         if len(found) >= (len(options.starts) if fits else options.most):
             break
+        if found and scores[k][0] < options.room:
+            continue
         starts = options.starts[min(len(found), len(options.starts) - 1)]
         whole = without_idle(problems[k])
         found.append((whole, search(whole.at(rows), SearchOptions(refined=starts, tried=2 * starts))))

@@ -15,6 +15,7 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats
 from pentapod.geometry.directions import normalised, tangent_frame
 from pentapod.geometry.solids import Solid
+from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.mesh.query.heightfield import HeightField
 from pentapod.mesh.query.swept_depth import TouchingBody, sweep, touch
@@ -28,7 +29,8 @@ class ReachOptions:
     about the normal, or about the axis, that are tried. places: positions on the end of the cutter that are tried, as
     shares of its flat part and of its rounding. depth_m: depth of a cutter that is not a ball that counts as none, as
     its sweep is not exact. halvings, near_m: of the distance of the nearest centre, and how near to it is enough.
-    above_m: height of the points whose view is tested.
+    above_m: height of the points whose view is tested. leans: directions of a leaning tool that are tried; slack_m of a
+    ray counts as none.
     """
 
     projections: int = 24
@@ -39,6 +41,29 @@ class ReachOptions:
     halvings: int = 14
     near_m: float = 5e-6
     above_m: float = 1e-5
+    leans: int = 72
+
+
+def open_to_leans(
+    mesh: Mesh, points: Floats, view: Floats, most: float, options: ReachOptions = ReachOptions()
+) -> Bools:
+    """Return from which points (N, 3) a line leads out of the part, at most `most` radians from the view.
+
+    A ball with a stem as wide as itself that holds a point also holds, with its stem, the line from the point along its
+    axis. So no lean of such a tool reaches a point from which all these lines meet the part.
+    """
+    free = np.zeros(len(points), dtype=np.bool_)
+    first, second = tangent_frame(view)
+    # A spiral with even area on the cap.
+    height = 1.0 - (np.arange(options.leans) + 0.5) / options.leans * (1.0 - np.cos(most))
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(options.leans)
+    for up, angle in zip(height.tolist(), turn.tolist(), strict=True):
+        rows = np.flatnonzero(~free)
+        if not len(rows):
+            break
+        lean = up * view + np.sqrt(1.0 - up**2) * (np.cos(angle) * first + np.sin(angle) * second)
+        free[rows] = ~HeightField(mesh, lean).hides(points[rows], options.slack_m)
+    return free
 
 
 def nearest_centres(

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.units import from_si
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.solids import Solid
 from pentapod.mesh.patch import Patch
@@ -24,6 +25,7 @@ from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
 from pentapod.verify.surface.limit_surface import LimitSurface, is_ball_end, under_overhangs
+from pentapod.verify.surface.reachable import open_to_leans
 from pentapod.verify.surface.swept_cutter import SweptSolid
 from pentapod.verify.verdict.coverage import Coverage
 from pentapod.verify.verdict.cutting import Cutting
@@ -52,6 +54,9 @@ class SurfaceOptions:
 
 OPTIONS = SurfaceOptions()
 
+SURFACE_LEFT = "surface left on the region"
+"""Name of the claim."""
+
 
 @dataclass(frozen=True, eq=False)
 class _Left:
@@ -63,7 +68,7 @@ class _Left:
     cells show that no more is left. shape: the largest height that the shape leaves there. cell: largest width of those
     cells, metres. deepest: largest height along the normal that is left where the tool could have been, metres,
     measured up to `far`; place (3,): where. gap: largest distance of the cutter from where it could have been, 0 where
-    nothing is missed.
+    nothing is missed. leant: area of `beyond` that a tool that leans might reach.
     """
 
     missed: float
@@ -76,6 +81,7 @@ class _Left:
     place: Floats
     gap: float
     far: float
+    leant: float = 0.0
 
 
 def surface_left(replay: Replay) -> Finding | Idle:
@@ -133,6 +139,7 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
     middles, normals = middles[chosen], normals[chosen]
     limit = LimitSurface.above(replay, coverage, cutting, middles, normals)
     known = np.isfinite(limit.heights)
+    everywhere, excused = (middles, normals, weights), ~known
     above, middles, weights, unknown = limit.where(known), middles[known], weights[known], float(weights[~known].sum())
     heights, gaps = np.full(len(middles), OPTIONS.far * reach), np.full(len(middles), np.inf)
     for one in swept:
@@ -144,6 +151,7 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
         at, its_normals, limit = middles[kept_off], normals[known][kept_off], above.where(own & shaped)
         kept_off = kept_off[under_overhangs(cutting, coverage, at, its_normals, limit)]
         own[kept_off] = shaped[kept_off] = False
+        excused[np.flatnonzero(known)[kept_off]] = True
         unknown += float(weights[kept_off].sum())
     own = np.flatnonzero(own)
     deepest, place, gap = float(highest[0]), highest[1:], 0.0
@@ -163,7 +171,22 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
         place,
         gap,
         OPTIONS.far * reach,
+        _leant(coverage, cutting, *(each[excused] for each in everywhere)),
     )
+
+
+def _leant(coverage: Coverage, cutting: Cutting, points: Floats, normals: Floats, areas: Floats) -> float:
+    """Return of the areas (N,) of points (N, 3) that the program may leave what a tool that leans might reach.
+
+    Of a stem thinner than the cutter nothing is known: there all counts.
+    """
+    if not (coverage.leans > 0.0 and len(points)):
+        return 0.0
+    wide = max((solid.largest_radius for solid in cutting.cutter), default=0.0)
+    if any(min(solid.low_radius, solid.high_radius) + solid.rounding < wide for solid in cutting.solids):
+        return float(areas.sum())
+    above = points + coverage.left * normals
+    return float(areas[open_to_leans(cutting.surface.mesh, above, coverage.up, coverage.leans)].sum())
 
 
 def _chosen(areas: Floats, most: int) -> tuple[Ints, Floats]:
@@ -212,7 +235,14 @@ def _method(found: _Left, coverage: Coverage, area: float, *, beam: bool) -> str
         text += f" judged by what is left beyond that, at the middles {cells}"
     some = found.between > 0.0 or found.shaped > 0.0
     text += ", the rest proven at every point" if some else "; proven at every point"
-    return text + (f"; {100.0 * found.beyond / area:.3g} % more {hidden}" if found.beyond > 0.0 else "")
+    text += f"; {100.0 * found.beyond / area:.3g} % more {hidden}" if found.beyond > 0.0 else ""
+    if coverage.leans > 0.0 and found.beyond > 0.0:
+        text += (
+            f", as the program's tool stays upright: a tool that leans by up to "
+            f"{from_si(coverage.leans, 'deg'):.0f} deg might reach {100.0 * found.leant / area:.3g} % of the region "
+            "there, and reaches the rest at no lean"
+        )
+    return text
 
 
-CLAIMS = (Claim("surface left on the region", surface_left, needs_proof=True),)
+CLAIMS = (Claim(SURFACE_LEFT, surface_left, needs_proof=True),)

@@ -37,7 +37,9 @@ class Coverage(Value):
     left: height of material, along the surface normal, up to which the surface is finished, metres; for a stand-off
     tool the largest distance of the surface from the line of its beam or spray. share: of the region's area, 0 to 1, on
     which more may be left. view (3,): towards the tool, any length. whole: makes the toolpath that covers all of the
-    region, where a program may be a piece of it. Raises ArrayError unless `left` is positive and `share` from 0 to 1.
+    region, where a program may be a piece of it. leans: largest angle of the tool from the view, radians, up to which
+    it is told what the program leaves although a tool that leans might reach it; 0 tells nothing. Raises ArrayError
+    unless `left` is positive and `share` from 0 to 1.
     """
 
     region: Patch | None
@@ -46,6 +48,7 @@ class Coverage(Value):
     view: Floats | tuple[float, float, float] = (0.0, 0.0, 1.0)
     whole: Callable[[], Toolpath] | None = None
     why: str = ""
+    leans: float = 0.0
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.left) and self.left > 0.0):
