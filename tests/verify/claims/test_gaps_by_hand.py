@@ -13,7 +13,7 @@ from pentapod.kinematics import LinearPentapod
 from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
 from pentapod.machine.clearance.leg_clearance import pair_names
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.query.distance import MeshDistance
+from pentapod.mesh.query.distance import TOOL_RESOLUTION_M, MeshDistance
 from pentapod.verify.claims.bodies import clearance
 from pentapod.verify.claims.collisions import body_displacements, claims, line_offsets
 from pentapod.verify.replay.clearance_bounds import Displacement, clearance_bound, displacements
@@ -81,7 +81,7 @@ def test_a_corner_beside_the_spindle(still, pose, gap):
     assert ("is in the fixture; exact at this moment" in found.method) == (gap < 0.0)
 
 
-@pytest.mark.parametrize(("gap", "passed"), [(3e-3, True), (-4e-5, True), (-6e-5, False)])
+@pytest.mark.parametrize(("gap", "passed"), [(3e-3, True), (-3e-5, True), (-6e-5, False)])
 def test_a_corner_of_the_part_beside_the_holder(still, pose, gap, passed):
     """Of the tool's body a part allows what it counts as no gouge."""
     machine, (position, direction) = still.machine, pose
@@ -89,7 +89,9 @@ def test_a_corner_of_the_part_beside_the_holder(still, pose, gap, passed):
     at = position + (machine.tool_length - 0.04) * direction + (HOLDER.low_radius + gap) * out
     part = corner(at, out, still.program.placement.inverse(), allowance=5e-5)
     found = judged(still, part, (SHANK, HOLDER))["tool body clear of the part"]
-    assert found.value == pytest.approx(1e3 * gap, rel=1e-3, abs=1e-3)
+    # A lower bound, as sharp as the distance of tools is: its resolution, and 1 % of a depth.
+    least = 1e3 * (gap - TOOL_RESOLUTION_M + 0.01 * min(gap, 0.0))
+    assert least - 1e-6 <= found.value <= 1e3 * gap + 1e-6
     assert found.bound == pytest.approx(-0.05, rel=1e-9)
     assert found.passed is passed
 
