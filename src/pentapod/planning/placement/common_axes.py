@@ -105,7 +105,7 @@ def with_common_axis(
             continue
         starts = options.starts[min(len(found), len(options.starts) - 1)]
         whole = without_idle(problems[k])
-        found.append((whole, search(whole.at(rows), SearchOptions(refined=starts, tried=2 * starts))))
+        found.append((whole, search(whole.at(rows), SearchOptions(refined=starts, tried=2 * starts, polished=False))))
         best = max(best, found[-1][1][1].best.smallest)
         if found[-1][1][1].interrupted:
             break

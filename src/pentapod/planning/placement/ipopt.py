@@ -69,8 +69,12 @@ class IpoptSolver:
     options: IpoptOptions = IpoptOptions()
     _solvers: dict[Any, Any] = field(default_factory=dict[Any, Any])
 
-    def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
-        """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one."""
+    def raise_margin(self, start: Candidate, enough: float = np.inf, beat: float | None = None) -> Candidate:
+        """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one.
+
+        beat: the largest margin of other candidates, of no use here.
+        """
+        del beat
         best, (rows, kinds), reach = start, self._first(start), 1.0
         touching = bool(start.margins.scene.collision_world.obstacles)
         for _ in range(self.options.rounds):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
 
 import numpy as np
 
@@ -65,7 +66,6 @@ def first_guesses(problem: PlacementProblem, seed: int = 0, options: SamplingOpt
     few = samples.at(rows)
     gaps = tool_gaps(few, problem.margins[0].scene)
     for margins in problem.margins:
-        simple = samples.tilt == 0.0 and not margins.scene.collision_world.obstacles
         rotations = _rotations(mean_axis, -float(margins.scene.branch.w), tries, options.largest_slope, rng)
         places = _places(machine, tries, rng)
         if constraints.is_bounded:
@@ -81,14 +81,9 @@ def first_guesses(problem: PlacementProblem, seed: int = 0, options: SamplingOpt
                 rotations, origins = constraints.nearest(rotations, places - rotations @ centre)
                 places = origins + rotations @ centre
         translations = places - rotations @ centre
-        score = _score(samples, margins, rotations, translations, rows)
-        best = _best(score, options.ranked)
-        found: list[Guess] = []
-        for k in best:
-            place = constraints.nearest_to(RigidTransform(_orthonormal(rotations[k]), translations[k]))
-            tilted = score[k] if simple else best_tilted_margins(few, margins, place, gaps)[0].min()
-            found.append(Guess(margins, place, float(tilted)))
-        guesses += _different(sorted(found, key=lambda g: -g.margin), centre, options)
+        best = _best(_score(samples, margins, rotations, translations, rows), options.ranked)
+        poses = [constraints.nearest_to(RigidTransform(_orthonormal(rotations[k]), translations[k])) for k in best]
+        guesses += _best_different(few, margins, poses, gaps, options)
     return sorted(guesses, key=lambda g: -g.margin)
 
 
@@ -160,20 +155,47 @@ def _best(score: Floats, count: int) -> Ints:
     return np.argsort(-score, kind="stable")[:count]
 
 
-def _different(guesses: list[Guess], centre: Floats, options: SamplingOptions) -> list[Guess]:
-    """Return the first guesses, sorted, that differ from those before them."""
+def _best_different(
+    few: ToolpathSamples,
+    margins: Margins,
+    poses: list[RigidTransform],
+    gaps: Floats | None,
+    options: SamplingOptions,
+) -> list[Guess]:
+    """Return the best guesses of a branch, none near another, the best first.
+
+    Obstacles take most of the time, and no margin is larger with them: only poses are judged with them that are among
+    the best without them.
+    """
+    centre = few.tilt_centres.mean(axis=0)
+    waiting = [(-bound, False, k) for k, bound in enumerate(_without_obstacles(few, margins, poses).tolist())]
+    heapify(waiting)
     kept: list[Guess] = []
-    for guess in guesses:
-        for other in kept:
-            apart = float(np.linalg.norm(guess.transform.apply(centre) - other.transform.apply(centre)))
-            turn = 0.5 * (float(np.trace(guess.transform.rotation.T @ other.transform.rotation)) - 1.0)
-            if apart < options.apart_m and turn > np.cos(options.apart_rad):
-                break
-        else:
-            kept.append(guess)
-        if len(kept) == options.kept:
-            break
+    while waiting and len(kept) < options.kept:
+        negative, judged, k = heappop(waiting)
+        if not judged and margins.scene.collision_world.obstacles:
+            heappush(waiting, (-float(best_tilted_margins(few, margins, poses[k], gaps)[0].min()), True, k))
+        elif not any(_near(poses[k], other.transform, centre, options) for other in kept):
+            kept.append(Guess(margins, poses[k], -negative))
     return kept
+
+
+def _without_obstacles(few: ToolpathSamples, margins: Margins, poses: list[RigidTransform]) -> Floats:
+    """Return the smallest margin (G,) of each placement without obstacles, each waypoint at its best tilt."""
+    first, second = tangent_frame(few.nominal)
+    grid = tilts(few.tilt)
+    aside = few.room(slice(None))[:, None] * (grid[:, None, :1] * first + grid[:, None, 1:] * second)
+    rotations, translations = np.stack([p.rotation for p in poses]), np.stack([p.translation for p in poses])
+    axes = np.einsum("gij,knj->gkni", rotations, lean(few.nominal, aside))
+    centres = np.einsum("gij,nj->gni", rotations, few.tilt_centres) + translations[:, None]
+    return margins.own(centres[:, None] - few.tilt_centre * axes, axes).min(axis=-1).max(axis=1).min(axis=-1)
+
+
+def _near(one: RigidTransform, other: RigidTransform, centre: Floats, options: SamplingOptions) -> bool:
+    """Return whether two placements of a path with this centre are alike."""
+    apart = float(np.linalg.norm(one.apply(centre) - other.apply(centre)))
+    turn = 0.5 * (float(np.trace(one.rotation.T @ other.rotation)) - 1.0)
+    return apart < options.apart_m and turn > np.cos(options.apart_rad)
 
 
 def _score(samples: ToolpathSamples, margins: Margins, r: Floats, t: Floats, rows: Ints) -> Floats:

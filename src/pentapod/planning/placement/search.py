@@ -31,6 +31,7 @@ class SearchOptions:
     refined: number in any case. tried: maximum while none is good enough. hopeless: where all guesses are below this
     margin, the search is first made without obstacles. beyond_reach: best margin after the first `refined` starts below
     which no other start is expected to lead to a placement that fits. waypoints: used in every step from a given start.
+    polished: whether the best is improved until nothing is gained.
     """
 
     refined: int = 4
@@ -38,6 +39,7 @@ class SearchOptions:
     hopeless: float = -0.5
     beyond_reach: float = -0.1
     waypoints: int = 600
+    polished: bool = True
 
 
 Start = tuple[Margins, RigidTransform]
@@ -46,8 +48,11 @@ Start = tuple[Margins, RigidTransform]
 class Solver(Protocol):
     """A local solver: `sequential`, the default, or `ipopt`, the reference."""
 
-    def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
-        """Return a candidate near `start` with the largest smallest margin, or with `enough`; never a worse one."""
+    def raise_margin(self, start: Candidate, enough: float = np.inf, beat: float | None = None) -> Candidate:
+        """Return a candidate near `start` with the largest smallest margin, or with `enough`; never a worse one.
+
+        beat: the largest margin of other candidates with which it is compared; it may end early then.
+        """
         ...
 
     def smooth(self, start: Candidate, keep: float) -> Floats | None:
@@ -115,11 +120,14 @@ def search(
         for margins, transform in starts[:count]:
             if constraints.moves and tried >= options.refined and best is not None and _is_decided(best, options):
                 break
-            found = improver.raise_margin(first_candidate(problem, margins, transform, gaps))
+            beat = -np.inf if best is None else best.smallest
+            found = improver.raise_margin(first_candidate(problem, margins, transform, gaps), beat=beat)
             best = found if best is None or found.smallest > best.smallest else best
             tried += 1
             note = f"component {best.margins.scene.branch}, best margin so far {best.smallest:.3f}"
             progress("placement", tried / count, note)
+        if options.polished and best is not None and best.smallest >= NEEDED_MARGIN:
+            best = improver.raise_margin(best)
     except KeyboardInterrupt:
         if best is None or best.smallest < NEEDED_MARGIN:
             raise

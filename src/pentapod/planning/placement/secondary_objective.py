@@ -192,7 +192,7 @@ def improved(solver: SequentialSolver, start: Candidate, objective: Objective, k
             if trial is not None and trial.smallest < keep:  # the worst margins may not have been in the model
                 values = problem.values(trial.margins, trial.transform, trial.coefficients)
                 extra = np.union1d(extra, valleys(values))
-                model = solver.model(best, rows, keep, extra)
+                model = solver.model(best, rows, keep, (extra, _NO_ROWS))
     return best
 
 

@@ -28,18 +28,23 @@ _NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
 class SequentialOptions:
     """Options of the trust-region method.
 
-    waypoints: used in every step, at most; all are checked when the steps have ended. steps, rounds: maximum of steps,
-    and of checks at all waypoints. tolerance: decrease of the smallest margin at all waypoints that calls for another
-    round. least: smaller predicted increases, and smaller trust regions, end the steps. radius: of the first trust
-    region. accepted, good, very_good: ratios of actual to predicted increase from which a step is taken, and the radius
-    is kept, and doubled; else it shrinks by the factor shrink.
+    waypoints: used in every step where there are no more; of more, so many evenly spaced ones, and those where the
+    margins are smallest, up to `lowest` for each kind. All are checked when the steps have ended. steps, rounds:
+    maximum of steps, and of checks at all waypoints. tolerance: decrease of the smallest margin at all waypoints that
+    calls for another round. least: smaller predicted increases, and smaller trust regions, end the steps. rough: the
+    same where candidates are compared. hope: predicted increases below the margin to beat at which steps end then.
+    radius: of the first trust region. accepted, good, very_good: ratios of actual to predicted increase from which a
+    step is taken, and the radius is kept, and doubled; else it shrinks by the factor shrink.
     """
 
-    waypoints: int = 4000
+    waypoints: int = 400
+    lowest: int = 24
     steps: int = 60
-    rounds: int = 6
+    rounds: int = 10
     tolerance: float = 1e-4
     least: float = 1e-5
+    rough: float = 1e-4
+    hope: float = 12.0
     radius: float = 0.5
     accepted: float = 0.05
     good: float = 0.25
@@ -60,33 +65,42 @@ class SequentialSolver:
     options: SequentialOptions = SequentialOptions()
     rows: Ints | None = None
 
-    def raise_margin(self, start: Candidate, enough: float = np.inf) -> Candidate:
-        """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one."""
-        rows, best = self._waypoints(), start
+    def raise_margin(self, start: Candidate, enough: float = np.inf, beat: float | None = None) -> Candidate:
+        """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one.
+
+        beat: the largest margin of other candidates. Steps then end where they lead to less, and near the optimum.
+        """
+        best, rows = start, self._waypoints(start)
         for _ in range(self.options.rounds):
-            found = self._optimised(best, rows, enough + self.options.tolerance)
+            found = self._optimised(best, rows, enough + self.options.tolerance, beat)
             values = self.problem.values(found.margins, found.transform, found.coefficients)
             smallest = float(values.min())
             if smallest > best.smallest:
                 best = Candidate(found.margins, found.transform, found.coefficients, smallest)
-            if smallest >= found.smallest - self.options.tolerance:
+            if smallest >= found.smallest - self.options.tolerance or (beat is not None and found.smallest < beat):
                 break
-            rows = np.union1d(rows, np.argsort(values.min(axis=1), kind="stable")[: self.options.waypoints // 8])
+            rows = np.union1d(rows, _smallest(values, self.options.lowest))
         return best
 
     def smooth(self, start: Candidate, keep: float) -> Floats | None:
         """Return coefficients (K, 2) of the smoothest spline at the placement of `start` that keeps `keep`."""
         return smoothed(self.problem, start, keep)
 
-    def _waypoints(self) -> Ints:
+    def _waypoints(self, start: Candidate) -> Ints:
+        """Return the waypoints of the first round."""
         if self.rows is not None:
             return self.rows
-        count = len(self.problem.samples.tilt_centres)
-        return np.unique(np.linspace(0, count - 1, min(count, self.options.waypoints)).astype(np.intp))
+        count, most = len(self.problem.samples.tilt_centres), self.options.waypoints
+        if count <= 2 * most:
+            return np.arange(count)
+        values = self.problem.values(start.margins, start.transform, start.coefficients)
+        spread = np.linspace(0, count - 1, most).astype(np.intp)
+        return np.union1d(spread, _smallest(values, self.options.lowest))
 
-    def _optimised(self, start: Candidate, rows: Ints, enough: float) -> Candidate:
+    def _optimised(self, start: Candidate, rows: Ints, enough: float, beat: float | None) -> Candidate:
         """Return the result of the trust-region method, with its smallest margin over `rows`."""
-        problem, options, radius, extra = self.problem, self.options, self.options.radius, _NO_ROWS
+        problem, options, radius, extra, leaning = self.problem, self.options, self.options.radius, _NO_ROWS, _NO_ROWS
+        least = options.least if beat is None else options.rough
         here = problem.values(start.margins, start.transform, start.coefficients, rows)
         best = Candidate(start.margins, start.transform, start.coefficients, float(here.min()))
         slopes = step_slopes(problem, start.margins, guides=self.guides)
@@ -96,7 +110,7 @@ class SequentialSolver:
             if best.smallest >= enough:
                 break
             step, change, predicted = curvature.best_step(model, best, radius)
-            if predicted < options.least:
+            if predicted < least or (beat is not None and best.smallest + options.hope * predicted < beat):
                 break
             coefficients, values, gain = problem.within_cone(best.coefficients + change), np.zeros((0, 1)), -np.inf
             moved = self._moved(best, step)
@@ -107,12 +121,12 @@ class SequentialSolver:
             radius *= 2.0 if gain > options.very_good * predicted else kept
             if moved is not None and gain > options.accepted * predicted:
                 best, here = Candidate(*moved, coefficients, float(values.min())), values
-            elif radius < options.least:
+            elif radius < least:
                 break
             elif moved is not None:  # the worst margins may not have been in the model
-                steepness = problem.steepness(best.coefficients + change, rows)
-                extra = np.union1d(extra, np.union1d(valleys(values), valleys(-steepness[:, None])))
-            model = self.model(best, rows, best.smallest, extra, slopes, here)
+                extra = np.union1d(extra, valleys(values))
+                leaning = np.union1d(leaning, valleys(-problem.steepness(best.coefficients + change)[:, None]))
+            model = self.model(best, rows, best.smallest, (extra, leaning), slopes, here)
         return best
 
     def _moved(self, at: Candidate, step: Floats) -> tuple[Margins, RigidTransform] | None:
@@ -130,14 +144,14 @@ class SequentialSolver:
         at: Candidate,
         rows: Ints,
         level: float,
-        extra: Ints = _NO_ROWS,
+        extra: tuple[Ints, Ints] = (_NO_ROWS, _NO_ROWS),
         slopes: StepSlopes | None = None,
         values: Floats | None = None,
     ) -> LinearModel:
         """Return the linear model around a candidate of what comes near a margin of `level` among `rows`.
 
-        extra: indices into rows that enter in any case. slopes: of the margins; those of the candidate by default.
-        values (n, M): the candidate's margins at `rows`, where they are known.
+        extra: what enters in any case: margins at indices into rows, and leans at waypoints. slopes: of the margins;
+        those of the candidate by default. values (n, M): the candidate's margins at `rows`, where they are known.
         """
         slopes = step_slopes(self.problem, at.margins) if slopes is None else slopes
         room = self._room(at.transform)
@@ -154,3 +168,8 @@ class SequentialSolver:
     @cached_property
     def _room(self) -> Room:
         return placement_room(self.problem.constraints, free=self.free)
+
+
+def _smallest(values: Floats, count: int) -> Ints:
+    """Return the waypoints of the smallest local minima of margins (N, M), and where these are smallest of all."""
+    return np.union1d(valleys(values, count), np.argsort(values.min(axis=1), kind="stable")[: 4 * count])

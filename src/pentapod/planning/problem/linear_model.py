@@ -62,14 +62,15 @@ class LinearModel:
         at: Candidate,
         rows: Ints,
         level: float,
-        extra: Ints,
+        extra: tuple[Ints, Ints],
         slopes: StepSlopes,
         room: tuple[Floats, Floats],
         moves: Floats,
         values: Floats | None = None,
     ) -> LinearModel:
-        """Return the model of the margins near `level` at waypoints `rows`, and of rows[extra] in any case.
+        """Return the model of the margins near `level` at waypoints `rows`, and of the steepest leans of all waypoints.
 
+        extra: indices into rows, and waypoints of leans, that enter in any case.
         room (L,): constraints of placement and rail positions, with their derivatives (L, p). slopes: derivatives of
         the margins, (n, M, p + 2) by step, rail positions and lean. values (n, M): the candidate's margins at
         `rows`, where they are known.
@@ -77,7 +78,7 @@ class LinearModel:
         length, count = moves.shape
         if values is None:
             values = problem.values(at.margins, at.transform, at.coefficients, rows)
-        chosen = np.union1d(valleys(values), extra)
+        chosen = np.union1d(valleys(values), extra[0])
         chosen = chosen[values[chosen].min(axis=1) < level + OPTIONS.near]
         point, kinds = np.nonzero(values[chosen] < level + OPTIONS.near)
         few = rows[chosen]
@@ -85,7 +86,7 @@ class LinearModel:
         if len(few):
             slope = slopes(at.margins, at.transform, at.coefficients, few)[point, kinds]
         field = by_field(problem.basis[few][point], slope[:, length:]) * problem.cone
-        steep, share, steep_by_field = _cone_tangents(problem, at, rows, extra)
+        steep, share, steep_by_field = _cone_tangents(problem, at, extra[1])
         return cls(
             problem,
             at,
@@ -125,25 +126,25 @@ def valleys(values: Floats, count: int = OPTIONS.worst) -> Ints:
     return np.unique(worst[np.take_along_axis(valley, worst, axis=0)])
 
 
-def _cone_tangents(problem: PlacementProblem, at: Candidate, rows: Ints, extra: Ints) -> tuple[Ints, Floats, Floats]:
+def _cone_tangents(problem: PlacementProblem, at: Candidate, extra: Ints) -> tuple[Ints, Floats, Floats]:
     """Return tangents of the cone at the steepest leans: waypoints, the share used in that direction, its derivatives.
 
-    Several tangents for each lean, since a lean on the edge may turn along it.
+    Several tangents for each lean, since a lean on the edge may turn along it. extra: waypoints in any case.
     """
     tangents = np.radians(OPTIONS.tangents_deg)
-    steepness = problem.steepness(at.coefficients, rows)
+    steepness = problem.steepness(at.coefficients)
     steep = np.union1d(valleys(-steepness[:, None], OPTIONS.steepest), extra)
     steep = steep[steepness[steep] > OPTIONS.steep]
-    room = problem.samples.room(rows[steep])[:, None]
-    nominal, basis = problem.samples.nominal[rows[steep]], problem.basis[rows[steep]] / room
-    outward = problem.leans(at.coefficients, rows[steep]) / (steepness[steep, None] * problem.cone * room)
+    room = problem.samples.room(steep)[:, None]
+    nominal, basis = problem.samples.nominal[steep], problem.basis[steep] / room
+    outward = problem.leans(at.coefficients, steep) / (steepness[steep, None] * problem.cone * room)
     aside = np.cross(nominal, outward)
     shares, derivatives = [np.zeros(0)], [np.zeros((0, 2 * problem.basis.shape[1]))]
     for turn in tangents:
         direction = np.cos(turn) * outward + np.sin(turn) * aside
         shares.append(np.cos(turn) * steepness[steep])
         derivatives.append(by_field(basis, direction @ problem.domain.lean_plane.T))
-    return np.tile(rows[steep], len(tangents)), np.concatenate(shares), np.concatenate(derivatives)
+    return np.tile(steep, len(tangents)), np.concatenate(shares), np.concatenate(derivatives)
 
 
 def by_field(basis: Floats, by_lean: Floats) -> Floats:
