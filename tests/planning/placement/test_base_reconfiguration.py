@@ -84,7 +84,7 @@ def test_curvature_is_that_of_the_machine_with_its_guides_moved(sliding, here):
     at = problem.candidate(Margins.of(machine, COMPONENT), here, problem.upright + 0.05)
     rows, moves, none = np.arange(len(problem.samples.tilt_centres)), 0.1 * np.eye(11), np.zeros(0, dtype=np.intp)
     slopes = step_slopes(start, Margins.of(sliding, COMPONENT), guides=True)
-    model = LinearModel.of(problem, at, rows, np.inf, none, slopes, (np.zeros(0), np.zeros((0, 11))), moves)
+    model = LinearModel.of(problem, at, rows, np.inf, (none, none), slopes, (np.zeros(0), np.zeros((0, 11))), moves)
     rng = np.random.default_rng(5)
     strokes = np.flatnonzero(["too" in at.margins.limits[k].name for k in model.kinds])  # smooth everywhere
     multipliers = np.zeros(len(model.values) + len(model.steep))
