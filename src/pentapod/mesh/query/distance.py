@@ -20,7 +20,7 @@ from pentapod.mesh.normals import unit_or_zero
 from pentapod.mesh.query.swept_depth import TouchingBody, touch
 from pentapod.mesh.query.tree import FacetTree
 
-TOOL_RESOLUTION_M = 1e-5
+TOOL_RESOLUTION_M = 1e-6
 """Gaps of tools are exact to this."""
 
 
