@@ -26,7 +26,7 @@ from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify import Coverage, Cutting, Specification
 from pentapod.verify.verdict.verdict import Sources
 
-LEANS = float(np.radians(45.0))
+LEANS = 0.25 * np.pi
 """How far from the view a tool might lean on any machine: what only such a lean reaches is told."""
 
 

@@ -154,7 +154,8 @@ def _lowered(best: Floats, g: Floats, x: float, y: float, z: float) -> bool:
 def _keep(piece: Floats, at: int, g: Floats, x: float, y: float, z: float) -> None:
     """Write a corner of a piece (21,), from index `at` on: the point, f and its gradient."""
     piece[at], piece[at + 1], piece[at + 2], piece[at + 3] = x, y, z, g[VALUE]
-    piece[at + 4], piece[at + 5], piece[at + 6] = g[0], g[1], g[2]
+    for j in range(3):
+        piece[at + 4 + j] = g[j]
 
 
 @kernel
