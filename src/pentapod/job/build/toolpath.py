@@ -48,7 +48,7 @@ RATE_SLACK = 1.05
 """Factor on the cap of the axis's turn: it holds along the contact points, not along the tilt centres."""
 
 
-BESIDE = 0.3
+BESIDE = 0.2
 """Share of the gouge tolerance that is kept for a motion beside the path."""
 
 
