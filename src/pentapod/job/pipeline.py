@@ -13,7 +13,7 @@ from pentapod.base.errors import ToolpathError
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal
 from pentapod.job.advice.options import OPTIONS, AdviceOptions
-from pentapod.job.advice.search import advised
+from pentapod.job.advice.search import TOUCHES, advised
 from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, check_folder, write_arrays, write_json
 from pentapod.job.build.limits import timing_limits
 from pentapod.job.build.pieces import job_part, job_piece, job_without
@@ -43,9 +43,6 @@ from pentapod.verify import Claim, Verdict, judged
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
 
 Writer = Callable[[Outcome, Path], object]
-
-TOUCHES = ("tool body", "the tool touches")
-"""Beginnings of the names of limits and claims that say that shank or holder touch the part."""
 
 STANDS = (
     "went back: the tool stays upright, and passes end where the part leans over them, since no lean that was found "

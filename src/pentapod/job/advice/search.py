@@ -28,8 +28,8 @@ Passes = Callable[[Job, Progress], bool]
 """Plans a job, all stages, and returns whether its verdict passed. Raises KeyboardInterrupt where it is interrupted."""
 
 
-TOUCHES = ("tool body touches", "the tool touches")
-"""Beginnings of the names of the limits that keep shank, stem and holder from the part."""
+TOUCHES = ("tool body", "the tool touches")
+"""Beginnings of the names of limits and claims that keep shank, stem and holder from the part."""
 
 
 @dataclass(frozen=True)

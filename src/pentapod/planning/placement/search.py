@@ -31,7 +31,7 @@ class SearchOptions:
     refined: number in any case. tried: maximum while none is good enough. hopeless: where all guesses are below this
     margin, the search is first made without obstacles. beyond_reach: best margin after the first `refined` starts below
     which no other start is expected to lead to a placement that fits. waypoints: used in every step from a given start.
-    polished: whether the best is improved until nothing is gained.
+    polished: whether the best is improved until nothing is gained also where it fits.
     """
 
     refined: int = 4
@@ -126,7 +126,9 @@ def search(
             tried += 1
             note = f"component {best.margins.scene.branch}, best margin so far {best.smallest:.3f}"
             progress("placement", tried / count, note)
-        if options.polished and best is not None and best.smallest >= NEEDED_MARGIN:
+        # Compared roughly, the best may be just short of the margin that is needed.
+        rough = best is not None and (options.polished or best.smallest < NEEDED_MARGIN)
+        if rough and best is not None and best.smallest >= options.beyond_reach:
             best = improver.raise_margin(best)
     except KeyboardInterrupt:
         if best is None or best.smallest < NEEDED_MARGIN:

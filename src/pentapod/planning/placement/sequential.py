@@ -28,8 +28,8 @@ _NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
 class SequentialOptions:
     """Options of the trust-region method.
 
-    waypoints: used in every step where there are no more; of more, so many evenly spaced ones, and those where the
-    margins are smallest, up to `lowest` for each kind. All are checked when the steps have ended. steps, rounds:
+    waypoints: used in every step, evenly spaced, beside those where the margins are smallest, up to `lowest` for each
+    kind; all, where there are no more than twice as many. All are checked when the steps have ended. steps, rounds:
     maximum of steps, and of checks at all waypoints. tolerance: decrease of the smallest margin at all waypoints that
     calls for another round. least: smaller predicted increases, and smaller trust regions, end the steps. rough: the
     same where candidates are compared. hope: predicted increases below the margin to beat at which steps end then.
