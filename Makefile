@@ -15,15 +15,17 @@ ORACLES := pytest pytest-xdist hypothesis mpmath rtree pyyaml psutil python-flin
 LOWEST_TESTS := tests/numerics tests/geometry tests/kinematics tests/timing tests/program tests/mesh/query/test_swept_depth.py \
 	tests/toolpath/inputs/test_drawings.py tests/simulate/test_servo.py tests/job/test_pipeline.py
 
-.PHONY: demo test test-all test-lowest lock lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view bench-machines reference pictures site clean
+.PHONY: demo test test-all test-lowest lock lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view bench-machines kernels reference pictures site clean
 
 demo: $(READY)  ## plan a dome and judge the program
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
 
-test: $(READY)  ## the fast suite
+test: $(READY)  ## the fast suite; kernels are compiled before, on all cores
+	$(BIN)/pentapod warm-up
 	$(BIN)/pytest $(SPREAD) -m "not slow" --durations=25
 
 test-all: $(READY)  ## everything, the long forms too
+	$(BIN)/pentapod warm-up
 	$(BIN)/pytest $(SPREAD)
 
 test-lowest:  ## a part of the fast suite with the lowest versions that pyproject.toml allows, in an environment of its own
@@ -81,6 +83,11 @@ bench-machines: $(READY)  ## figures of the shipped machines, how well power-on 
 	$(BIN)/python examples/17_passive_joints.py --machine spr --seconds 20
 	$(BIN)/python examples/17_passive_joints.py --machine prpu --seconds 20
 	$(BIN)/python benchmarks/as_built.py
+	$(BIN)/python benchmarks/measuring.py
+
+kernels: $(READY)  ## the list of kernels that `pentapod warm-up` compiles, from what the fast suite calls
+	rm -rf out/kernels && NUMBA_CACHE_DIR=$(CURDIR)/out/kernels $(BIN)/pytest -q $(SPREAD) -m "not slow"
+	$(BIN)/python tests/list_kernels.py out/kernels
 
 reference: $(READY)  ## the pages of docs/reference, from the code
 	$(BIN)/python docs/make_reference.py

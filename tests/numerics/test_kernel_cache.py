@@ -107,23 +107,20 @@ def test_processes_that_compile_at_once_spoil_nothing(package: Package):
 
 
 def test_one_at_a_time_and_the_next_when_all_of_it_is_done(tmp_path: Path):
-    one, other = kernel_cache.ProcessLock(tmp_path), kernel_cache.ProcessLock(tmp_path)
+    one, other = (kernel_cache.ProcessLock(tmp_path / "lock") for _ in range(2))
     order = []
 
     def follow() -> None:
-        other.begin()
-        order.append("other")
-        other.end()
+        with other:
+            order.append("other")
 
-    one.begin()
-    one.begin()
     thread = threading.Thread(target=follow)
-    thread.start()
-    thread.join(0.2)
-    one.end()
-    thread.join(0.2)
-    order.append("one")
-    one.end()
+    with one:
+        with one:
+            thread.start()
+            thread.join(0.2)
+        thread.join(0.2)
+        order.append("one")
     thread.join(10.0)
     assert order == ["one", "other"]
 

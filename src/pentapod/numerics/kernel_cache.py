@@ -1,7 +1,8 @@
 """Disk cache of compiled kernels: one folder for each state of their sources.
 
 A kernel holds the machine code of those it calls, but numba looks for changes in the kernel's own file only. So the
-folder's name is a digest of all files with kernels: what was compiled for an older version is never looked at.
+folder's name is a digest of all files with kernels, and of how they are compiled: what was compiled for an older
+version is never looked at.
 The folders are in the user's cache folder, or in the one that NUMBA_CACHE_DIR names; never beside the sources, which
 may be read-only.
 """
@@ -26,7 +27,7 @@ from typing import IO
 _log = logging.getLogger("pentapod")
 
 _NAME = "pentapod-kernels-"
-_LOCK = "lock"
+_USED = "lock"
 
 
 @dataclass(frozen=True)
@@ -51,13 +52,13 @@ def kernel_cache(given: str) -> Path | None:
 
     given: a folder that the user chose, or "". Folders of versions that were not used for a month are removed.
     """
-    sources = sorted(Path(__file__).parents[1].rglob("*_kernels.py"))
+    sources = [Path(__file__).with_name("kernels.py"), *sorted(Path(__file__).parents[1].rglob("*_kernels.py"))]
     digest = hashlib.sha256(b"\0".join(file.read_bytes() for file in sources)).hexdigest()
     try:
         parent = Path(given) if given else _user_cache()
         folder = parent / f"{_NAME}{digest[:16]}"
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        (folder / _LOCK).touch()  # its time is that of the last use
+        (folder / _USED).touch()  # its time is that of the last use
         with tempfile.TemporaryFile(dir=folder):
             pass
         _sweep(folder)
@@ -83,34 +84,33 @@ def _sweep(folder: Path) -> None:
     """Remove the folders beside this one that have not been used for long."""
     for other in folder.parent.glob(f"{_NAME}*"):
         with suppress(OSError):  # gone already, or not ours
-            unused = time.time() - (other / _LOCK).stat().st_mtime
+            unused = time.time() - (other / _USED).stat().st_mtime
             if other != folder and unused > OPTIONS.unused and not other.is_symlink():
                 shutil.rmtree(other)
 
 
 class ProcessLock:
-    """Lock of the folder: one process at a time loads and compiles kernels between `begin` and `end`.
+    """Lock of a kernel: one process at a time loads or compiles it; others do so with other kernels meanwhile.
 
-    Two that write numba's index of one kernel at once could else file one's machine code under the other's types. A
-    process may begin several times, also in several threads; the lock is released when all have ended. Where the file
-    system has no locks, and after `patience`, the process goes on without.
+    Two that write numba's index of one kernel at once could else file one's machine code under the other's types.
+    Kernels that call each other have no cycles, so no two processes wait for each other. A process may enter several
+    times, also in several threads; the lock is released when all have left. Where the file system has no locks, and
+    after `patience`, the process goes on without.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._path = folder / _LOCK
+    def __init__(self, path: Path) -> None:
+        self._path = path
         self._count = 0
         self._guard = threading.Lock()
         self._held: IO[bytes] | None = None
 
-    def begin(self) -> None:
-        """Wait until no other process holds the lock."""
+    def __enter__(self) -> None:
         with self._guard:
             self._count += 1
             if self._count == 1:
                 self._held = _locked(self._path)
 
-    def end(self) -> None:
-        """Release the lock, where this is the last end."""
+    def __exit__(self, *failure: object) -> None:
         with self._guard:
             self._count -= 1
             if self._count == 0 and self._held is not None:

@@ -19,7 +19,6 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
-from pathlib import Path
 from typing import Any, Literal, TypeVar, cast
 
 from pentapod.numerics.kernel_cache import ProcessLock, kernel_cache
@@ -59,24 +58,36 @@ def kernel(function: _Function) -> _Function:
     from numba import config, njit  # noqa: PLC0415  heavy: only where kernels are used
 
     settings: Any = config  # made from the environment as it is loaded
-    options: dict[str, Any] = {"error_model": "numpy", "fastmath": False}
+    options: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "nogil": True}
     with _choosing:
         given: str = settings.CACHE_DIR
         folder = kernel_cache(given)
-        _listen(folder)
+        _listen()
         if folder is None:
             return cast("_Function", njit(**options)(function))
         # numba asks for the folder here only; what else the process compiles goes where it went.
         settings.CACHE_DIR = str(folder)
         try:
-            return cast("_Function", njit(cache=True, **options)(function))
+            dispatcher: Any = njit(cache=True, **options)(function)
         finally:
             settings.CACHE_DIR = given
+    if settings.DISABLE_JIT:
+        return cast("_Function", dispatcher)
+    lock = ProcessLock(folder / f"{function.__module__}.{function.__qualname__}.lock")
+    compile_alone = dispatcher.compile
+
+    def compile_once(signature: Any) -> Any:
+        """Compile under the kernel's lock: from the look into the cache to the entry in it."""
+        with lock:
+            return compile_alone(signature)
+
+    dispatcher.compile = compile_once
+    return cast("_Function", dispatcher)
 
 
 @cache
-def _listen(folder: Path | None) -> None:
-    """Let one process at a time compile, and write to the log once when this one begins: it takes long."""
+def _listen() -> None:
+    """Write to the log once when this process begins to compile: it takes long."""
     from numba.core import event  # noqa: PLC0415
 
     class CompileMessage(event.Listener):
@@ -87,23 +98,12 @@ def _listen(folder: Path | None) -> None:
         def on_start(self, event: object) -> None:
             if not self.said:
                 self.said = True
-                _log.info("compiling the fast kernels: once on this machine, for half a minute or so")
+                _log.info(
+                    "compiling the fast kernels: once on this machine, for a minute or so; "
+                    "`pentapod warm-up` does it for all of them, on all cores"
+                )
 
         def on_end(self, event: object) -> None:
             """Nothing to say."""
 
-    class FolderLock(event.Listener):
-        """Holds the folder's lock while numba holds its own: from the look into the cache to the entry in it."""
-
-        def __init__(self, lock: ProcessLock) -> None:
-            self._lock = lock
-
-        def on_start(self, event: object) -> None:
-            self._lock.begin()
-
-        def on_end(self, event: object) -> None:
-            self._lock.end()
-
     event.register("numba:compile", CompileMessage())
-    if folder is not None:
-        event.register("numba:compiler_lock", FolderLock(ProcessLock(folder)))

@@ -1,0 +1,67 @@
+"""Threads: independent pieces of work on all cores, and linear algebra on one thread.
+
+Kernels and operations on large arrays leave the interpreter to other threads.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextvars import copy_context
+from functools import wraps
+from typing import ParamSpec, TypeVar
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def in_threads(
+    function: Callable[[_Item], _Result], items: Iterable[_Item], threads: int | None = None
+) -> Iterator[_Result]:
+    """Yield function(item) for all items, in their order; the same results for any number of threads.
+
+    threads: by default one for each core; with 1 all is done in this one. No more items are begun than threads are
+    ahead of the result that is asked for, so that few results are held.
+    """
+    count = threads or cores()
+    if count == 1:
+        yield from map(function, items)
+        return
+    with ThreadPoolExecutor(count) as pool:
+        begun: deque[Future[_Result]] = deque()
+        try:
+            for item in items:
+                begun.append(pool.submit(copy_context().run, function, item))
+                if len(begun) > count:
+                    yield begun.popleft().result()
+            while begun:
+                yield begun.popleft().result()
+        finally:
+            for future in begun:
+                future.cancel()
+
+
+def on_one_thread(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Return the function with BLAS on one thread: on several it adds in another order, and last bits differ.
+
+    On one kind of processor and with one set of libraries, that is: they choose the order of sums too. The matrices of
+    a plan are small; more threads gain nothing on them.
+    """
+
+    @wraps(function)
+    def limited(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        from threadpoolctl import threadpool_limits  # noqa: PLC0415  only when planning
+
+        with threadpool_limits(limits=1, user_api="blas"):
+            return function(*args, **kwargs)
+
+    return limited

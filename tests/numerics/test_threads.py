@@ -1,0 +1,43 @@
+"""in_threads: results in the order of the items, few at a time, and errors where they belong."""
+
+import threading
+import time
+
+import pytest
+
+from pentapod.numerics.kernels import kernels_pay, kernels_used
+from pentapod.numerics.threads import cores, in_threads
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5, None])
+def test_results_are_in_the_order_of_the_items(threads):
+    def slow_first(k: int) -> int:
+        time.sleep(0.02 if k % 3 == 0 else 0.0)
+        return k * k
+
+    assert list(in_threads(slow_first, range(20), threads)) == [k * k for k in range(20)]
+    assert list(in_threads(slow_first, [], threads)) == []
+
+
+def test_several_work_at_once_and_no_more_than_are_asked_for():
+    together = threading.Barrier(3, timeout=10.0)
+    assert list(in_threads(lambda k: together.wait() >= 0, range(3), 3)) == [True] * 3
+    begun = []
+    results = in_threads(lambda k: begun.append(k) or k, range(100), 2)
+    assert next(results) == 0
+    time.sleep(0.05)
+    assert len(begun) <= 4
+    results.close()
+
+
+def test_an_error_comes_where_its_result_would():
+    results = in_threads(lambda k: 1 // (3 - k), range(10), 2)
+    assert [next(results) for _ in range(3)] == [0, 0, 1]
+    with pytest.raises(ZeroDivisionError):
+        next(results)
+
+
+def test_what_is_set_for_a_block_holds_in_its_threads():
+    with kernels_used("never"):
+        assert list(in_threads(lambda _: kernels_pay(1e9), range(4), 2)) == [False] * 4
+    assert cores() >= 1
