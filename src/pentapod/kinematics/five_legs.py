@@ -70,24 +70,6 @@ class FiveLegs(LegsOnLine):
         unit = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
         return np.concatenate([unit, self.offsets[:, None] * unit], axis=-1)
 
-    def leg_derivatives(self, tips: Sequence[tuple[Floats, Floats]], tool_length: float) -> list[Floats]:
-        """Return leg lengths (n, 5) and their derivatives along a curve, of as many orders as are given.
-
-        tips: at [k] the derivatives of order k ≤ 3 of the tip and of the tool axis (tip → spindle), (n, 3) each.
-        """
-        lever = (tool_length - self.offsets)[:, None]
-        # From the base joints to the platform joints b_i = tip + (tool length − z_i) axis.
-        d = [tip[:, None, :] + lever * axis[:, None, :] for tip, axis in tips]
-        d[0][..., :2] -= self.base
-        legs, order = [np.sqrt(_dot(d[0], d[0]))], len(tips) - 1
-        if order >= 1:
-            legs.append(_dot(d[0], d[1]) / legs[0])
-        if order >= 2:
-            legs.append((_dot(d[1], d[1]) + _dot(d[0], d[2]) - legs[1] * legs[1]) / legs[0])
-        if order >= 3:
-            legs.append((3.0 * _dot(d[1], d[2]) + _dot(d[0], d[3]) - 3.0 * legs[1] * legs[2]) / legs[0])
-        return legs
-
     def vectors_of(self, p: Vector, i: Vector, do: Arithmetic, joints: Joints | None = None) -> list[Vector]:
         """Return `leg_vectors`, one for each leg, by a formula for numbers and symbols alike; joints: as moved."""
         base, offsets = (self.base.tolist(), self.offsets.tolist()) if joints is None else joints
@@ -121,10 +103,6 @@ class FiveLegs(LegsOnLine):
             squared += np.square(z * w + pz)
             legs[block] = np.sqrt(squared, out=squared).T
         return legs.reshape(*batch, 5)
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.einsum("nij,nij->ni", a, b)
 
 
 def outputs(out: tuple[Floats, ...] | None, batch: tuple[int, ...], *tails: tuple[int, ...]) -> tuple[Floats, ...]:

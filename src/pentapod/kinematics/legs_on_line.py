@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -34,3 +34,16 @@ class LegsOnLine:
         """Return bounds (N, n_legs) of how far the platform joints get: they are points of the line."""
         robot = cast("Any", self)
         return robot.enclose(poses, legs, robot.offsets)[0]
+
+    def leg_derivatives(self, tips: Sequence[tuple[Floats, Floats]], tool_length: float) -> list[Floats]:
+        """Return readings (n, n_legs) and their derivatives along a curve, of as many orders as are given.
+
+        tips: at [k] the derivatives of order k ≤ 3 of the tip and of the tool axis (tip → spindle), (n, 3) each.
+        """
+        from pentapod.kinematics.five_legs_kernels import readings_along  # noqa: PLC0415 - loads numba
+
+        robot, curve = cast("Any", self), np.array(tips)
+        legs = np.empty((len(tips), curve.shape[2], self.n_legs))
+        levers = tool_length - robot.offsets
+        readings_along(curve[:, 0], curve[:, 1], robot.base_joints, levers, robot.radii, robot.zeros, legs)
+        return list(legs)

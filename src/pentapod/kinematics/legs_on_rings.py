@@ -13,7 +13,6 @@ from pentapod.base.errors import ArrayError, MachineError
 from pentapod.kinematics.arithmetic import Arithmetic, Joints, Vector, dot
 from pentapod.kinematics.batches import as_poses
 from pentapod.kinematics.legs_on_line import LegsOnLine
-from pentapod.kinematics.leibniz import cross_products, scalar_products, square_roots
 
 
 class LegsOnRings(LegsOnLine):
@@ -73,31 +72,6 @@ class LegsOnRings(LegsOnLine):
     def platform_joints(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return the points of the rings (..., 5, 3) at which the legs end, metres."""
         return self.base + self.leg_vectors(position, direction)
-
-    def leg_derivatives(self, tips: Sequence[tuple[Floats, Floats]], tool_length: float) -> list[Floats]:
-        """Return readings (n, 5) and their derivatives along a curve, of as many orders as are given.
-
-        tips: at [k] the derivatives of order k ≤ 3 of the tip and of the tool axis (tip → spindle), (n, 3) each.
-        """
-        lever = tool_length - self.offsets
-        axes = [axis[:, None, :] for _, axis in tips]
-        e = [np.empty((3, len(tip), 5)) for tip, _ in tips]  # whole components in one piece
-        for out, (tip, axis) in zip(e, tips, strict=True):
-            for c in range(3):
-                out[c] = tip[:, c, None] + lever * axis[:, c, None]
-        e[0] -= self.base.T[:, None, :]
-        e = [np.moveaxis(out, 0, -1) for out in e]
-        squares = scalar_products(e, e)
-        ringed = np.flatnonzero(self.radii)
-        if ringed.size:
-            normal = cross_products([x[:, ringed] for x in e], axes)
-            radii, rho = self.radii[ringed], square_roots(scalar_products(normal, normal))
-            for square, by in zip(squares, rho, strict=True):
-                square[:, ringed] -= 2.0 * radii * by
-            squares[0][:, ringed] += radii**2
-        lengths = square_roots(squares)
-        lengths[0] += self.zeros
-        return lengths
 
     def vectors_of(self, p: Vector, i: Vector, do: Arithmetic, joints: Joints | None = None) -> list[Vector]:
         """Return `leg_vectors`, one for each leg, by a formula for numbers and symbols alike; joints: as moved."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Unpack
 
@@ -13,6 +14,7 @@ from pentapod.base.files import atomic_write, sha256_of
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import stage
 from pentapod.machine.machine import Machine
+from pentapod.numerics.threads import in_threads
 from pentapod.program.csv import read_csv
 from pentapod.program.program import Program
 from pentapod.toolpath.toolpath import Toolpath
@@ -126,10 +128,11 @@ def judged(
     replay, unjudged = Replay(program, specification, progress), list[NotJudged]()
     _ = replay.interval_bounds  # first, because its progress is the first share
     around = collisions.claims(specification.collision_world, len(specification.machine.bars.names))
-    claims = (*CLAIMS, *around, *claims)
-    for k, claim in enumerate(claims):
+    own = (*CLAIMS, *around)
+    answers = chain(in_threads(lambda claim: claim(replay), own), (claim(replay) for claim in claims))
+    claims = (*own, *claims)
+    for k, (claim, answer) in enumerate(zip(claims, answers, strict=True)):
         progress("verify", REPLAY_SHARE + (1.0 - REPLAY_SHARE) * k / len(claims), claim.name)
-        answer = claim(replay)
         if isinstance(answer, Certificate):
             read.append(answer)
         elif answer.unknown:

@@ -86,3 +86,35 @@ def test_readings_without_a_pose_have_none():
     assert not proven.any()
     assert np.isnan(position).all()
     assert np.isnan(direction).all()
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_rows_beside_a_singularity_share_no_proof_that_one_of_them_does_not_have(seed):
+    """Turning up to w = 0, with errors so large that proofs end before: where those of single rows end."""
+    i = np.c_[np.linspace(0.8, 1.0, 1000), np.zeros((1000, 2))]
+    i[:, 2] = np.sqrt(1.0 - i[:, 0] ** 2)
+    rng = np.random.default_rng(seed)
+    machine = AsBuiltPentapod.of(DESK, base_errors=rng.uniform(-2e-3, 2e-3, (5, 3)), radii=rng.uniform(0.0, 0.01, 5))
+    legs = machine.leg_lengths(np.tile([0.1, 0.0, 0.25], (1000, 1)), i)
+    position, direction, proven = quick_poses(machine, DESK, legs, Component(1, 1))
+    ways = [machine_between(machine, DESK, s) for s in np.linspace(0.0, 1.0, 21)]
+    dets = [np.linalg.det(leg_jacobian(way, position[proven], direction[proven])) for way in ways]
+    assert (np.sign(dets) == np.sign(dets[0])).all()
+    end = np.flatnonzero(~proven)[0]
+    assert 400 < end < 900
+    assert all(quick_poses(machine, DESK, legs[row], Component(1, 1))[2] for row in range(end - 10, end))
+
+
+def machine_between(machine, nominal, share):
+    """The machine whose errors are this share of another's."""
+    parts = ((nominal.base_joints, machine.base), (nominal.offsets, machine.offsets), (0.0, machine.radii))
+    base, offsets, radii = (a + share * (b - a) for a, b in parts)
+    return AsBuiltPentapod(base, offsets, radii, machine.zeros)
+
+
+def leg_jacobian(machine, position, direction):
+    """Rows of the legs, and one for the direction's length."""
+    rows = np.zeros((len(position), 6, 6))
+    rows[:, :5] = machine.jacobian(position, direction)
+    rows[:, 5, 3:] = direction
+    return rows

@@ -10,7 +10,6 @@ from pentapod.base.errors import MachineError
 from pentapod.kinematics import leg_load_map
 from pentapod.kinematics.arithmetic import NUMPY
 from pentapod.kinematics.platforms.constrained import ConstrainedPlatform
-from pentapod.kinematics.platforms.constrained_poses import all_poses
 
 AZIMUTH = np.radians([20.0, 110.0, 200.0, 290.0, -35.0])
 BASE = 0.55 * np.stack([np.cos(AZIMUTH), np.sin(AZIMUTH)], axis=1)
@@ -154,7 +153,7 @@ def test_a_motion_through_a_singularity_is_not_proven(robot: ConstrainedPlatform
 def test_other_modes_have_the_same_legs(robot: ConstrainedPlatform) -> None:
     p, i = poses(1, 6)
     legs = robot.leg_lengths(p, i)[0]
-    at, along = all_poses(robot, legs)
+    at, along = robot.all_poses(legs)
     assert len(at) >= 2
     np.testing.assert_allclose(robot.leg_lengths(at, along), np.tile(legs, (len(at), 1)), atol=1e-10)
     assert np.linalg.norm(at - p, axis=1).min() < 1e-9

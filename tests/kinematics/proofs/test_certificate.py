@@ -1,6 +1,7 @@
 """The component certificate against exact rational arithmetic: never a false proof."""
 
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from rational_polynomials import add, at, divided, positive_on_unit_interval, po
 
 from pentapod.base.errors import ArrayError
 from pentapod.kinematics import COMPONENTS, LinearPentapod, certify_component, singularity_values
+from pentapod.kinematics.proofs import certificate
 from pentapod.numerics.bernstein import elevate, split
 
 
@@ -155,6 +157,27 @@ def test_a_leg_error_covers_every_motion_within_it(paper: LinearPentapod, k: int
             assert product[0] >= 4 * d1[0] * Fraction(float(covered.s_lower[index])) ** 2
             worst = min(worst, float(d1[0]) - sharp.w_lower[index] ** 2)
     assert worst < 0.0  # the sharp bound would not have covered them
+
+
+def test_leg_errors_whose_effects_cancel_do_not_lose_the_proof(paper: LinearPentapod, monkeypatch) -> None:
+    """Near S = 0 legs that are off move w² and S² by far less than the sum of what they do to each form."""
+    coefficients, error = segments(paper, 400, 1, 9, 1e-3, height=0.5), 2e-2
+    covered = certify_component(paper, coefficients, (1, 1), leg_error=error)
+    endless = np.full((2, 1), np.inf)
+    monkeypatch.setattr(certificate, "_close_shifts", lambda *_: endless)
+    quick = certify_component(paper, coefficients, (1, 1), leg_error=error)
+    only_close = np.flatnonzero(covered.proven & ~quick.proven)
+    assert (covered.proven >= quick.proven).all()
+    assert len(only_close) > 0.05 * len(coefficients)
+    exact, corners = Exact(paper), np.array(list(product((-error, error), repeat=5)))
+    for index in only_close[:12]:
+        for corner in corners:
+            legs = [
+                [Fraction(float(c[0])) + Fraction(float(e))] for c, e in zip(coefficients[index], corner, strict=True)
+            ]
+            d1, four = exact(legs)
+            assert d1[0] >= Fraction(float(covered.w_lower[index])) ** 2
+            assert four[0] >= 4 * d1[0] * Fraction(float(covered.s_lower[index])) ** 2
 
 
 def test_intervals_are_judged_one_by_one(pentapod: LinearPentapod) -> None:

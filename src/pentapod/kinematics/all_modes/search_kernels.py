@@ -12,7 +12,6 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.kinematics.all_modes.linear_kernels import reduced
-from pentapod.kinematics.proofs.built_kernels import equations, solved
 from pentapod.kinematics.proofs.krawczyk_kernels import (
     ROUND,
     contracted,
@@ -21,6 +20,7 @@ from pentapod.kinematics.proofs.krawczyk_kernels import (
     fill_spread,
     invert,
 )
+from pentapod.kinematics.proofs.newton_kernels import equations, solved
 from pentapod.numerics.kernels import kernel
 
 Room: TypeAlias = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats]

@@ -30,7 +30,7 @@ from pentapod.kinematics.batches import joined_poses
 from pentapod.kinematics.five_legs import given
 from pentapod.kinematics.leibniz import cross_products, scalar_products, square_roots, unit_vectors
 from pentapod.kinematics.mode import MODES, Mode
-from pentapod.kinematics.platforms.constrained_poses import continued_poses
+from pentapod.kinematics.platforms.constrained_poses import all_poses, continued_poses
 from pentapod.kinematics.platforms.constrained_proofs import ProvenByKrawczyk
 from pentapod.kinematics.robot import Branch, SingularSurface
 from pentapod.kinematics.wrench_determinant import Wrench, cross, leg_wrenches, wrench_determinant, zero_distance
@@ -148,6 +148,10 @@ class ConstrainedPlatform(Value, ProvenByKrawczyk):
         signs = np.broadcast_to(as_batch(branch, "branch", (2,)), (*lengths.shape[:-1], 2)).reshape(-1, 2)
         p, i = continued_poses(self, lengths.reshape(-1, 5), signs)
         return p.reshape(*lengths.shape[:-1], 3), i.reshape(*lengths.shape[:-1], 3)
+
+    def all_poses(self, legs: ArrayLike) -> tuple[Floats, Floats]:
+        """Return the different poses (K, 3) of leg lengths (5,) that are found; that of `pose` is the first."""
+        return all_poses(self, as_batch(legs, "legs", (5,)))
 
     def leg_lengths(self, position: ArrayLike, direction: ArrayLike) -> Floats:
         """Return leg lengths (..., 5), metres, of poses (..., 3)."""

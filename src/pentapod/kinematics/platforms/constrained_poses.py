@@ -17,7 +17,8 @@ class NewtonOptions:
     """steps: at most. settled: metres, largest error of a leg that ends it. shift, turn: longest step, m and rad.
 
     apart: rows between those that are solved from home; the others begin between their neighbours. starts: random poses
-    from which all modes are looked for; spread: of these, metres and of directions.
+    from which all modes are looked for; spread: of these, metres and of directions; same: difference of poses
+    that count as one, metres.
     """
 
     steps: int = 40
@@ -26,6 +27,7 @@ class NewtonOptions:
     turn: float = 0.3
     apart: int = 64
     starts: int = 400
+    same: float = 1e-6
     spread: tuple[float, float] = (0.6, 1.5)
 
 
@@ -52,16 +54,20 @@ def continued_poses(robot: Any, legs: Floats, signs: Floats) -> tuple[Floats, Fl
 
 
 def all_poses(robot: Any, legs: Floats, seed: int = 0) -> tuple[Floats, Floats]:
-    """Return the different poses (K, 3) of legs (5,) that Newton's method finds from random starts.
+    """Return the different poses (K, 3) of legs (5,) that Newton's method finds from home and from random starts.
 
-    That these are all is not proven.
+    The one that continues home is first, where there is one. That these are all is not proven.
     """
-    rng, (far, lean), count = np.random.default_rng(seed), OPTIONS.spread, OPTIONS.starts
+    rng, (far, lean), count, up = np.random.default_rng(seed), OPTIONS.spread, OPTIONS.starts, np.array([0.0, 0.0, 1.0])
     p = robot.home * rng.choice([-1.0, 1.0], (count, 1)) ** [0, 0, 1] + far * rng.uniform(-1.0, 1.0, (count, 3))
-    i = _unit(rng.choice([-1.0, 1.0], (count, 1)) * [0.0, 0.0, 1.0] + lean * rng.normal(size=(count, 3)))
+    i = _unit(rng.choice([-1.0, 1.0], (count, 1)) * up + lean * rng.normal(size=(count, 3)))
+    own = continued_poses(robot, legs[None], robot.branch(robot.home, up)[None])
     p, i, settled = refined(robot, np.broadcast_to(legs, (count, 5)), p, i)
-    p, i = p[settled], i[settled]
-    _, first = np.unique(np.round(np.column_stack([p, i]), 6), axis=0, return_index=True)
+    known = bool(np.isfinite(own[0]).all())
+    p, i = np.concatenate([own[0][:known], p[settled]]), np.concatenate([own[1][:known], i[settled]])
+    poses = np.column_stack([p, i])
+    same = np.abs(poses[:, None] - poses).max(axis=2) < OPTIONS.same
+    first = ~np.tril(same, -1).any(axis=1)
     return p[first], i[first]
 
 

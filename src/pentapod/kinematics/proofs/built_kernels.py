@@ -10,12 +10,16 @@ import numpy as np
 
 from pentapod.base.arrays import Bools, Floats
 from pentapod.kinematics.proofs.krawczyk_kernels import ROUND, enclosed, fill_defect, fill_line, invert, sided
+from pentapod.kinematics.proofs.newton_kernels import equations, solved
 from pentapod.kinematics.proofs.ring_kernels import NEAREST
 from pentapod.numerics.kernels import kernel
 
-TURNS, SETTLED, NEIGHBOUR = 12, 1e-6, 5e-3
-"""Newton's steps at most; size of a step (metres, radians) after which one more with the same Jacobian ends them; how
-far the nominal pose of a neighbour may be."""
+NEIGHBOUR = 5e-3
+"""How far (metres, radians) the nominal pose of a neighbour may be."""
+
+NARROWEST, WIDEST, HELD = 2e-4, 4e-3, 1e-7
+"""Radius (metres, radians) of the region of poses for which the way between the geometries is proven at once, so that
+the rows after a pose share its proof; how far the exact pose may be from the one that was found."""
 
 
 @kernel
@@ -42,7 +46,8 @@ def built_poses(
     spread, spread_i, g = np.empty((5, 3)), np.empty(3), np.empty(6)
     y, z, bound = np.empty(6), np.empty(6), np.empty(6)
     geometry, rings = stages[0], ring_stages[0]
-    nominal, last = np.empty(6), np.empty(6)
+    nominal, last, region = np.empty(6), np.empty(6), np.empty(8)
+    region[0], region[6], region[7] = np.inf, 0.0, WIDEST
     for h in range(len(lengths)):
         x = poses[h]
         known = h > 0 and proven[h - 1] and np.abs(x - last).max() < NEIGHBOUR
@@ -72,68 +77,16 @@ def built_poses(
             continue
         if order[h] == 0.0 and not sided(x, x, bound, signs[h], stages[-1]):
             continue
-        if not _joined(x, bound, stages, ring_stages, shift, weight, first, second, change, step, jacobian, work,
-                       inverse, defect):  # fmt: skip
+        if not bound.max() < HELD:
+            continue
+        if not held(x, known, region, stages, ring_stages, shift, weight, first, second, change, step, jacobian, work,
+                     inverse, defect):  # fmt: skip
             continue
         proven[h] = True
         if order[h] != 0.0:  # the determinant does not vanish near x
             fill_line(x, x, stages[-1], first, second, change, step, jacobian, ring_stages[-1])
             image = signs[h, 1] * x[5] - bound[5] > 4.0 * ROUND
             proven[h] = image and _determinant_sign(jacobian, work) == order[h]
-
-
-@kernel
-def solved(
-    x: Floats,
-    lengths: Floats,
-    geometry: Floats,
-    rings: Floats,
-    first: Floats,
-    second: Floats,
-    change: Floats,
-    step: Floats,
-    jacobian: Floats,
-    work: Floats,
-    inverse: Floats,
-    g: Floats,
-) -> bool:
-    """Move a pose to a solution by Newton's method, and fill C from its last step; return whether it converged."""
-    for _ in range(TURNS):
-        fill_line(x, x, geometry, first, second, change, step, jacobian, rings)
-        if not invert(jacobian, work, inverse):
-            return False
-        equations(x, lengths, first, rings, g)
-        if _newton_step(inverse, g, x) < SETTLED:
-            fill_line(x, x, geometry, first, second, change, step, jacobian, rings)
-            equations(x, lengths, first, rings, g)
-            _newton_step(inverse, g, x)
-            return True
-    return False
-
-
-@kernel
-def equations(x: Floats, lengths: Floats, vectors: Floats, rings: Floats, g: Floats) -> None:
-    """Fill G (6,) at a pose whose leg vectors and ring distances `fill_line` has filled."""
-    for j in range(5):
-        r = rings[j, 8]
-        square = vectors[j, 0] ** 2 + vectors[j, 1] ** 2 + vectors[j, 2] ** 2
-        g[j] = 0.5 * (square - lengths[j] ** 2)
-        if r > 0.0:
-            g[j] += r * (0.5 * r - rings[j, 0])
-    g[5] = 0.5 * (x[3] ** 2 + x[4] ** 2 + x[5] ** 2 - 1.0)
-
-
-@kernel
-def _newton_step(inverse: Floats, g: Floats, x: Floats) -> float:
-    """Subtract C G from the pose; return the largest change."""
-    largest = 0.0
-    for r in range(6):
-        total = 0.0
-        for n in range(6):
-            total += inverse[r, n] * g[n]
-        x[r] -= total
-        largest = max(largest, abs(total))
-    return largest
 
 
 @kernel
@@ -159,9 +112,10 @@ def _determinant_sign(matrix: Floats, work: Floats) -> float:
 
 
 @kernel
-def _joined(
+def held(
     x: Floats,
-    bound: Floats,
+    known: bool,
+    region: Floats,
     stages: Floats,
     ring_stages: Floats,
     shift: Floats,
@@ -175,14 +129,60 @@ def _joined(
     inverse: Floats,
     defect: Floats,
 ) -> bool:
-    """Return whether the Jacobian stays regular while the pose stays and the geometry goes from nominal to real.
+    """Return `_joined` of a pose, from the region of an earlier one where it is in it.
 
-    Tried are the whole way from its end, where the Jacobian is known, then from its middle, its halves, its quarters.
+    region (8,): its middle, how far it reaches, and how far the next one is to reach. known: whether poses follow one
+    another: only then a region is looked for. The arrays hold the line of this pose, C and its defect.
     """
-    for r in range(3):
-        if not bound[r] < 1e-7 or not bound[3 + r] < 1e-7:
+    moved, turned = 0.0, 0.0
+    for n in range(3):
+        moved += (x[n] - region[n]) ** 2
+        turned += (x[3 + n] - region[3 + n]) ** 2
+    if max(moved, turned) <= region[6] ** 2:
+        return True
+    region[0] = np.inf  # nothing is proven yet
+    if known:
+        region[6] = region[7]
+        if _joined(x, region[6], stages, ring_stages, shift, weight, first, second, change, step, jacobian, work,
+                   inverse, defect):  # fmt: skip
+            region[:6], region[7] = x, min(2.0 * region[7], WIDEST)
+            return True
+        region[7] = max(0.25 * region[7], NARROWEST)
+        fill_line(x, x, stages[0], first, second, change, step, jacobian, ring_stages[0])
+        if not invert(jacobian, work, inverse):
             return False
-    if _regular(x, first, stages[0], ring_stages[0], shift, 1.0, weight, jacobian, inverse, defect):
+        fill_defect(inverse, jacobian, defect)
+    region[6] = 0.0
+    good = _joined(x, 0.0, stages, ring_stages, shift, weight, first, second, change, step, jacobian, work, inverse,
+                   defect)  # fmt: skip
+    if good:
+        region[:6] = x
+    return good
+
+
+@kernel
+def _joined(
+    x: Floats,
+    reach: float,
+    stages: Floats,
+    ring_stages: Floats,
+    shift: Floats,
+    weight: float,
+    first: Floats,
+    second: Floats,
+    change: Floats,
+    step: Floats,
+    jacobian: Floats,
+    work: Floats,
+    inverse: Floats,
+    defect: Floats,
+) -> bool:
+    """Return whether the Jacobian stays regular while a pose stays and the geometry goes from nominal to real.
+
+    So for all poses within reach of this one. Tried are the whole way from its end, where the Jacobian is known, then
+    from its middle, its halves, its quarters.
+    """
+    if _regular(x, reach, first, stages[0], ring_stages[0], shift, 1.0, weight, jacobian, inverse, defect):
         return True
     at, pieces = 1, 1
     while at + pieces < len(stages):
@@ -193,9 +193,8 @@ def _joined(
             if not good:
                 break
             fill_defect(inverse, jacobian, defect)
-            good = _regular(
-                x, first, stages[at + n], ring_stages[at + n], shift, 0.5 / pieces, weight, jacobian, inverse, defect
-            )
+            good = _regular(x, reach, first, stages[at + n], ring_stages[at + n], shift, 0.5 / pieces, weight, jacobian,
+                            inverse, defect)  # fmt: skip
             if not good:
                 break
         if good:
@@ -208,6 +207,7 @@ def _joined(
 @kernel
 def _regular(
     x: Floats,
+    reach: float,
     vectors: Floats,
     geometry: Floats,
     rings: Floats,
@@ -218,25 +218,27 @@ def _regular(
     inverse: Floats,
     defect: Floats,
 ) -> bool:
-    """Return whether ‖1 − C J‖ < 1 for all geometries within this share of the shift, and all poses within 1e-7.
+    """Return whether ‖1 − C J‖ < 1 for all geometries within this share of the shift, and all poses within reach.
 
     Norm: the largest component, positions divided by `weight`.
     """
-    near = 1e-6  # what the pose's distance may add to a row of J, and to ρ, by far
+    near = 1e-6  # what the exact pose's distance from the one found may add to a row of J, and to ρ, by far
     change, rest = np.empty((5, 6)), np.empty(5)
     for j in range(5):
         z, dz, r_m, dr = geometry[j, 3], half * shift[j, 3], rings[j, 8], half * shift[j, 4]
         da = np.sqrt(shift[j, 0] ** 2 + shift[j, 1] ** 2 + shift[j, 2] ** 2) * half
+        off = near + (1.0 + abs(z) + abs(dz)) * reach
         swing, turn = 0.0, 0.0
         if r_m > 0.0:
-            far, unit = rings[j, 3] + da, 1.001
-            if not rings[j, 2] - da * unit - near > NEAREST * far:
+            far, unit = rings[j, 3] + da + reach, 1.001
+            across = near + (da + reach) * unit + far * reach
+            if not rings[j, 2] - across > NEAREST * far:
                 return False
-            swing = 2.0 * (da * unit + near) / rings[j, 2]
-            turn = swing * far + da + near
-        reach = abs(dz) + da
-        rest[j] = 3.0 * weight * (near + (abs(dr) + r_m) * swing)
-        rest[j] += 3.0 * ((abs(z) + abs(dz)) * near + abs(dz) * reach + (abs(dr) + r_m) * turn)
+            swing = 2.0 * across / rings[j, 2]
+            turn = swing * far + da + reach + near
+        ring = abs(dr) + r_m
+        rest[j] = 3.0 * weight * (off + ring * (swing + reach))
+        rest[j] += 3.0 * ((abs(z) + abs(dz)) * off + abs(dz) * (abs(dz) + da) + ring * turn)
         for c in range(3):
             e, de = vectors[j, c], half * (shift[j, 3] * x[3 + c] - shift[j, c])
             change[j, c], change[j, 3 + c] = de, z * de + dz * e
@@ -244,7 +246,7 @@ def _regular(
                 change[j, c] -= dr * (e - jacobian[j, c]) / r_m
                 change[j, 3 + c] -= dr * (z * e - jacobian[j, 3 + c]) / r_m
     for r in range(6):
-        total = 3.0 * near * abs(inverse[r, 5])
+        total = 3.0 * (near + reach) * abs(inverse[r, 5])
         for j in range(5):
             total += abs(inverse[r, j]) * rest[j]
         for c in range(6):

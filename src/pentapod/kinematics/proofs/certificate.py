@@ -22,6 +22,7 @@ from pentapod.kinematics.component import Component, as_component
 from pentapod.kinematics.forward.quadratic import LinearPart
 from pentapod.kinematics.proof_results import ProofResult
 from pentapod.kinematics.tubes.leg_equations import QuadraticLegs
+from pentapod.numerics.balls import Ball
 from pentapod.numerics.bernstein import binomials
 from pentapod.numerics.blocks import blocks
 from pentapod.numerics.positivity import Positivity, positivity
@@ -30,6 +31,7 @@ METHOD = "by Bernstein coefficients of the discriminants of the forward kinemati
 """As a user reads it."""
 
 _UNIT_ROUNDOFF = 2.0**-53
+_ENTRY = _UNIT_ROUNDOFF  # share by which an entry of the linear map may be off: each is rounded once
 _SANE = (1e-40, 1e40)  # metres; within these nothing below can underflow or overflow to harm
 
 
@@ -122,10 +124,15 @@ def certify_component(
     squares, refuted, doubt = np.zeros((2, count)), np.zeros(count, dtype=np.bool_), np.full((count, 2), np.nan)
     with np.errstate(invalid="ignore", over="ignore", under="ignore"):
         for block in blocks(count, 2048):
-            answers = _answers(Discriminants.of(pentapod, coefficients[block], tops=leg_error > 0.0), leg_error, depth)
-            for row, answer in zip(squares, answers, strict=True):
-                row[block] = answer.low
-            refuted[block], doubt[block] = _joined(*answers)
+            rows = np.arange(block.start, block.stop)
+            for close in (False, True):  # the close bound costs more, and few intervals need it
+                answers = _answers(pentapod, coefficients[rows], leg_error, depth, close=close)
+                for row, answer in zip(squares, answers, strict=True):
+                    row[rows] = np.maximum(row[rows], answer.low)
+                refuted[rows], doubt[rows] = _joined(*answers)
+                rows = rows[((squares[:, rows] <= 0.0).any(axis=0)) & ~refuted[rows]]
+                if leg_error == 0.0 or not rows.size:
+                    break
         roots = np.nextafter(np.sqrt(squares), 0.0)  # rounded to nearest: one step down is below the root
     return ComponentProof(named, roots[0], roots[1], np.asarray((roots > 0.0).all(axis=0)), refuted, doubt)
 
@@ -167,8 +174,11 @@ def _gamma(roundings: int) -> float:
     return 1.01 * roundings * _UNIT_ROUNDOFF
 
 
-def _answers(forms: Discriminants, leg_error: float, depth: int) -> tuple[Positivity, Positivity]:
-    """Return whether w² and S² are positive over each interval."""
+def _answers(
+    pentapod: QuadraticLegs, legs: Floats, leg_error: float, depth: int, *, close: bool
+) -> tuple[Positivity, Positivity]:
+    """Return whether w² and S² are positive over each interval, with a quick or a close bound of what errors do."""
+    forms = Discriminants.of(pentapod, legs, tops=leg_error > 0.0)
     k, delta, linear, largest = forms.degree, forms.delta, forms.linear, forms.largest
     sane = np.asarray(((largest >= _SANE[0]) & (largest <= _SANE[1])).all(axis=0))
 
@@ -185,10 +195,12 @@ def _answers(forms: Discriminants, leg_error: float, depth: int) -> tuple[Positi
     d1_error, d_error = d1_rounding, d_rounding
     if leg_error > 0.0:
         # What any leg within leg_error of its polynomial can add; m2 is more than enough for the maxima, too.
-        bounds = np.stack([py_abs, u_abs, v_abs, r_abs, n_abs, c_abs])
-        tops = forms.tops + _gamma(m2) * bounds
-        l_shift = leg_error * (2.0 * largest + leg_error)
-        d1_shift, d_shift = _shifts(abs(delta), linear.changes(l_shift), l_shift[2], tops)
+        if close:
+            d1_shift, d_shift = _close_shifts(linear, delta, legs, leg_error)
+        else:
+            tops = forms.tops + _gamma(m2) * np.stack([py_abs, u_abs, v_abs, r_abs, n_abs, c_abs])
+            l_shift = leg_error * (2.0 * largest + leg_error)
+            d1_shift, d_shift = _quick_shifts(abs(delta), linear.changes(l_shift), l_shift[2], tops)
         d1_error = d1_rounding + 1.001 * d1_shift  # 0.001: the rounding of the shifts themselves
         d_error = d_rounding + 1.001 * d_shift
     w_squared, s_squared = forms.w_squared, forms.s_squared
@@ -200,7 +212,7 @@ def _answers(forms: Discriminants, leg_error: float, depth: int) -> tuple[Positi
     )
 
 
-def _shifts(delta: float, forms: Floats, l3: Floats, tops: Floats) -> tuple[Floats, Floats]:
+def _quick_shifts(delta: float, forms: Floats, l3: Floats, tops: Floats) -> tuple[Floats, Floats]:
     """Return how far w² and S² move (N,) when q, py, u, v move by `forms` (4, N) and l3² by `l3` (N,).
 
     tops: the largest |py|, |u|, |v|, |R²|, |n|², |c| of each interval. |(a + da)² − a²| ≤ da (2|a| + da).
@@ -212,3 +224,38 @@ def _shifts(delta: float, forms: Floats, l3: Floats, tops: Floats) -> tuple[Floa
     n = 2.0 * delta * u + delta * delta * v_squared
     c = q + delta * (v_top * py + py_top * v + v * py)
     return u_squared + v_squared, r_top * n + n_top * r + r * n + c * (2.0 * c_top + c)
+
+
+def _close_shifts(linear: LinearPart, delta: float, legs: Floats, leg_error: float) -> tuple[Floats, Floats]:
+    """Return how far w² and S² move (N,) when each leg of N intervals is off by up to leg_error, metres.
+
+    legs (N, 5, k + 1): Bernstein coefficients. By the mean value theorem in the squared legs: the sum over the legs of
+    the steepest slope on all squared legs that may occur, times how far the squared leg moves. The slopes keep their
+    signs until the forms are summed, so what cancels does so here, unlike in `_quick_shifts`.
+    """
+    low, high = legs.min(axis=2).T, legs.max(axis=2).T
+    polynomials = Ball.between(Ball.exact(low), Ball.exact(high))
+    actual = polynomials.widened(leg_error)
+    squares = actual * actual
+    entries = Ball(linear.linear_map, _ENTRY * np.abs(linear.linear_map))
+    constant = Ball(linear.constant, _ENTRY * np.abs(linear.constant))
+    q, py, u, v = (
+        sum((entries[f, i] * squares[i] for i in range(len(squares.mid))), constant[f]) for f in range(len(entries.mid))
+    )
+    r, n = squares[2] - py * py, 1.0 - 2.0 * delta * u + (1.0 - v * v) * (delta * delta)
+    c = q + v * py * delta
+    s_slopes = (
+        -2.0 * c,
+        -2.0 * (py * n) - 2.0 * delta * (c * v),
+        -2.0 * delta * r,
+        -2.0 * delta * (delta * (v * r) + c * py),
+    )
+    w_slopes = (-2.0 * u, -2.0 * v)
+    moves = leg_error * (2.0 * polynomials.magnitude + leg_error)
+    w, s = np.zeros(len(legs)), np.zeros(len(legs))
+    for i, move in enumerate(moves):
+        s_slope = sum((slope * entries[f, i] for f, slope in enumerate(s_slopes)), n if i == 2 else Ball.exact(0.0))
+        w_slope = sum((slope * entries[2 + f, i] for f, slope in enumerate(w_slopes)), Ball.exact(0.0))
+        w += w_slope.magnitude * move
+        s += s_slope.magnitude * move
+    return w, s

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats
-from pentapod.kinematics.proofs.built_kernels import solved
 from pentapod.kinematics.proofs.chords_kernels import line_corrections, line_residuals, sane
 from pentapod.kinematics.proofs.krawczyk_kernels import (
     ROUND,
@@ -19,6 +18,7 @@ from pentapod.kinematics.proofs.krawczyk_kernels import (
     fill_spread,
     invert,
 )
+from pentapod.kinematics.proofs.newton_kernels import solved
 from pentapod.numerics.kernels import kernel
 
 

@@ -6,10 +6,14 @@ a box the changes of ρ are bounded by its first and second derivatives: lemma 1
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.numerics.kernels import kernel
+
+Triple: TypeAlias = tuple[float, float, float]
 
 NEAREST = 1.0 / 16.0
 """ρ / |d| below which nothing is proven: nearer to the line, rounding would need a closer bound."""
@@ -28,23 +32,27 @@ def ring_line(
     end and in the middle, |d| in the middle, a bound of |ρ'''| on the line, and the unit vector (3,) in the middle
     along which the ring's centre is r farther than the point where the leg ends; last r, which is given.
     """
-    i0, i1 = start[3:], end[3:]
-    ring[0] = norm(_cross(first, i0))
-    ring[1] = norm(_cross(second, i1))
-    i, d, shift, turn = 0.5 * (i0 + i1), np.empty(3), np.empty(3), np.empty(3)
-    for n in range(3):
-        d[n] = 0.5 * (first[n] + second[n]) - offset * i[n]
-        shift[n], turn[n] = end[n] - start[n], i1[n] - i0[n]
-    normal = _cross(d, i)
-    ring[2], ring[3] = norm(normal), norm(d)
-    moved, turned = norm(shift), norm(turn)
+    i0, i1 = (start[3], start[4], start[5]), (end[3], end[4], end[5])
+    f0, f1 = (first[0], first[1], first[2]), (second[0], second[1], second[2])
+    ring[0] = length(cross(f0, i0))
+    ring[1] = length(cross(f1, i1))
+    i = 0.5 * (i0[0] + i1[0]), 0.5 * (i0[1] + i1[1]), 0.5 * (i0[2] + i1[2])
+    d = (
+        0.5 * (f0[0] + f1[0]) - offset * i[0],
+        0.5 * (f0[1] + f1[1]) - offset * i[1],
+        0.5 * (f0[2] + f1[2]) - offset * i[2],
+    )
+    normal = cross(d, i)
+    ring[2], ring[3] = length(normal), length(d)
+    moved = length((end[0] - start[0], end[1] - start[1], end[2] - start[2]))
+    turned = length((i1[0] - i0[0], i1[1] - i0[1], i1[2] - i0[2]))
     change = LONGEST_DIRECTION * moved + (ring[3] + moved) * turned
     nearest = ring[2] - 0.5 * change
     ring[4] = np.inf
     if nearest > NEAREST * ring[3]:
         ring[4] = 3.0 * change / nearest * (2.0 * moved * turned + change * change / nearest)
-    normal /= ring[2]
-    by_position, by_direction = _cross(i, normal), _cross(normal, d)
+    unit = normal[0] / ring[2], normal[1] / ring[2], normal[2] / ring[2]
+    by_position, by_direction = cross(i, unit), cross(unit, d)
     for n in range(3):
         row[n] -= ring[8] * by_position[n]
         row[3 + n] -= ring[8] * by_direction[n]
@@ -75,13 +83,16 @@ def ring_swing(ring: Floats, region: tuple[float, float]) -> float:
 @kernel
 def norm(a: Floats) -> float:
     """Return the length of a vector (3,)."""
+    return length((a[0], a[1], a[2]))
+
+
+@kernel
+def length(a: Triple) -> float:
+    """Return the length of a vector in three numbers: they need no memory of their own."""
     return np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
 @kernel
-def _cross(a: Floats, b: Floats) -> Floats:
-    out = np.empty(3)
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-    return out
+def cross(a: Triple, b: Triple) -> Triple:
+    """Return the vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

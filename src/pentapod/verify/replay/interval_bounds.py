@@ -15,9 +15,11 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.interpolant import Interpolant, clamped_slopes
 from pentapod.kinematics.proof_results import BranchProof, Chords
+from pentapod.kinematics.robot import Poses
 from pentapod.machine.machine import Machine
 from pentapod.numerics.bernstein import split
 from pentapod.numerics.blocks import blocks
+from pentapod.numerics.threads import in_threads
 from pentapod.program.program import Program
 
 
@@ -124,30 +126,64 @@ def interval_bounds(
         axis_deviations=np.empty(2 * count),
         speeds=np.empty((2 * count, 3)),
     )
-    for intervals in blocks(count, block):
-        first, last = intervals.start, intervals.stop
-        progress(first / count)
+
+    def proven(intervals: slice) -> _Block:
+        return _Block.of(intervals, program, slopes, machine, tilt_centre, leg_error)
+
+    for part in in_threads(proven, blocks(count, block)):
+        progress(part.intervals.start / count)
+        part.add_to(found)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """What is computed of the intervals of a block."""
+
+    intervals: slice
+    wide: Interpolant
+    pose: tuple[Floats, Floats]
+    proof: BranchProof
+    chords: Chords
+    period: float
+
+    @classmethod
+    def of(
+        cls,
+        intervals: slice,
+        program: Program,
+        slopes: Floats | None,
+        machine: Machine,
+        tilt_centre: float,
+        leg_error: float,
+    ) -> _Block:
         # One interval more on each side: accelerations and jerks look across the rows.
-        low, high = max(first - 1, 0), min(last + 1, count)
+        low, high = max(intervals.start - 1, 0), min(intervals.stop + 1, len(program.legs) - 1)
         rows = slice(low, high + 1)
         wide = Interpolant.along(program.legs[rows], None if slopes is None else slopes[rows], program.period)
-        _legs(found, wide, first, slice(first - low, last - low))
-        part = Interpolant(wide.bernstein[first - low : last - low], program.period)
-        samples = slice(2 * first, 2 * last + 1)
-        found.position[samples], found.direction[samples] = machine.robot.pose(part.halves, program.component)
-        ends = found.position[samples][::2], found.direction[samples][::2]
-        found.component.update(machine.robot.prove(part.bernstein, ends, program.component, leg_error=leg_error), first)
-        between = slice(2 * first, 2 * last)
-        chords = _chords(found, machine, program, part, between, tilt_centre)
+        part = Interpolant(wide.bernstein[intervals.start - low : intervals.stop - low], program.period)
+        position, direction = machine.robot.pose(part.halves, program.component)
+        ends = position[::2], direction[::2]
+        proof = machine.robot.prove(part.bernstein, ends, program.component, leg_error=leg_error)
+        chords = _chords((position, direction), machine, program, part, tilt_centre)
+        return cls(intervals, wide, (position, direction), proof, chords, program.period)
+
+    def add_to(self, found: IntervalBounds) -> None:
+        """Add the block to what is found of all intervals."""
+        first, last, chords = self.intervals.start, self.intervals.stop, self.chords
+        low = max(first - 1, 0)
+        _legs(found, self.wide, first, slice(first - low, last - low))
+        samples, between = slice(2 * first, 2 * last + 1), slice(2 * first, 2 * last)
+        found.position[samples], found.direction[samples] = self.pose
+        found.component.update(self.proof, first)
         found.deviations[between], found.axis_deviations[between] = chords.deviations[:, 1], chords.angles
         found.speeds[between, :2] = chords.speeds[:, :2]
         # A joint beside the line gets no farther from its place at the start than at twice the speed in half a chord.
         found.speeds[between, 2] = np.maximum(chords.speeds[:, 2:].max(axis=1), 2.0 * chords.beside)
-        found.speeds[between] /= 0.5 * program.period
+        found.speeds[between] /= 0.5 * self.period
         found.base_widest.update(-chords.base_cosines, 2 * first)
         found.platform_closed.update(chords.platform_cosines[..., 1], 2 * first)
         found.platform_open.update(-chords.platform_cosines[..., 0], 2 * first)
-    return found
 
 
 def _legs(found: IntervalBounds, wide: Interpolant, first: int, inner: slice) -> None:
@@ -160,21 +196,19 @@ def _legs(found: IntervalBounds, wide: Interpolant, first: int, inner: slice) ->
     found.jerks.update(wide.jerks[inner], first)
 
 
-def _chords(
-    found: IntervalBounds, machine: Machine, program: Program, part: Interpolant, between: slice, tilt_centre: float
-) -> Chords:
-    """Return the proofs about the two chords of each interval, between poses that are known.
+def _chords(pose: Poses, machine: Machine, program: Program, part: Interpolant, tilt_centre: float) -> Chords:
+    """Return the proofs about the two chords of each interval, between poses (2 m + 1, 3) that are known.
 
     The points are the tip, the tilt centre, and both ends of the platform's line with the tool.
     """
     tip, heights = machine.tool_length, machine.bars.offsets
     halves = split(part.bernstein)
     legs = np.stack(halves, axis=1).reshape(-1, *part.bernstein.shape[1:])
-    start, end = between, slice(between.start + 1, between.stop + 1)
+    position, direction = pose
     return machine.robot.prove_chords(
         legs,
-        (found.position[start], found.direction[start]),
-        (found.position[end], found.direction[end]),
+        (position[:-1], direction[:-1]),
+        (position[1:], direction[1:]),
         program.component,
         offsets=np.array([tip, tip - tilt_centre, heights.min(), max(heights.max(), tip)]),
         base_axes=machine.joints.base_axes,
