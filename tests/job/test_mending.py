@@ -10,7 +10,7 @@ import pytest
 from pentapod.base.errors import ProgramError, ToolpathError
 from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.cli.commands.new import dome_stl
-from pentapod.job import Job, pipeline, run
+from pentapod.job import Job, run, task
 from pentapod.job.build.pieces import job_without, program_toolpath
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_mesh
@@ -151,7 +151,7 @@ def test_a_run_that_went_back_passes_and_its_program_names_what_it_leaves_out(do
     """The first placement is refused for three waypoints, as if the tool touched something there."""
     job, mesh, whole = dome
     job = Job.from_dict({**TABLES, "tolerance": {"left_share": 0.01}}, job.mesh_path.parent)
-    real, calls = pipeline.Task.program, []
+    real, calls = task.Task.program, []
 
     def once(self, file):
         calls.append(self.left_out)
@@ -161,12 +161,12 @@ def test_a_run_that_went_back_passes_and_its_program_names_what_it_leaves_out(do
         self.runner.run("placement", lambda: refusal)
         return refusal
 
-    monkeypatch.setattr(pipeline.Task, "program", once)
+    monkeypatch.setattr(task.Task, "program", once)
     done = run(job, tmp_path / "out", advice=None)
     assert done.passed
     assert calls[0] == ()
     assert any(stage.name == "mended" and "went back" in stage.remark for stage in done.stages)
     program = tmp_path / "out" / "program.csv"
-    assert f"left_out = [[{calls[1][0][0]}, {calls[1][0][1]}]]" in program.read_text()[:4000]
+    assert f"left_out = {[list(stretch) for stretch in calls[1]]}" in program.read_text()[:4000]
     again = program_toolpath(job, mesh, program)
     assert np.array_equal(cut_centres(again), cut_centres(job_without(job, mesh, whole, calls[1])))

@@ -25,7 +25,8 @@ from pentapod.cli.main import run as command
 from pentapod.job import run
 from pentapod.job.artefacts import REPORT
 from pentapod.job.build.placement import job_constraints
-from pentapod.job.build.toolpath import job_tool, job_toolpath
+from pentapod.job.build.tool import job_tool
+from pentapod.job.build.toolpath import job_toolpath
 from pentapod.kinematics import Component
 from pentapod.report import write_report
 from pentapod.verify import Coverage, verify

@@ -13,7 +13,7 @@ from pentapod.base.errors import InputError, JobError
 from pentapod.cli.commands.new import dome_stl
 from pentapod.cli.main import run as command
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job import Job, pipeline, run, task
+from pentapod.job import Job, run, stages, task
 from pentapod.job.outcome import SetUps
 from pentapod.machine.machine import Machine
 from pentapod.program import read_csv
@@ -59,7 +59,7 @@ def done(job):
 def pieces(done, monkeypatch):
     """The search for pieces is over at once: those found before."""
     found = tuple(part.piece for part in done[1].find(SetUps).parts)
-    monkeypatch.setattr(pipeline, "setups", lambda *_: found)
+    monkeypatch.setattr(stages, "setups", lambda *_: found)
 
 
 def test_each_set_up_has_its_files(done):
@@ -81,7 +81,7 @@ def test_each_set_up_has_its_files(done):
         assert part.margin > 0.02
         assert part.duration == read_csv(out / part.folder / "program.csv").duration
         assert part.outcome.passed
-    assert len({part.outcome.find(pipeline.PlacedPath).placement.chosen_by for part in setups.parts}) == 2
+    assert len({part.outcome.find(stages.PlacedPath).placement.chosen_by for part in setups.parts}) == 2
 
 
 def test_each_set_up_is_looked_at_by_itself(done):
@@ -194,7 +194,7 @@ def test_an_interruption_changes_nothing(stage, job, pieces, tmp_path, monkeypat
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(pipeline if hasattr(pipeline, stage) else task, stage, stop)
+    monkeypatch.setattr(stages if hasattr(stages, stage) else task, stage, stop)
     with pytest.raises(KeyboardInterrupt):
         run(Job.load(job), tmp_path / "out")
     assert not (tmp_path / "out").exists()

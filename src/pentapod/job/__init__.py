@@ -5,35 +5,28 @@ The names below are imported when they are first used, so that reading a job fil
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from pentapod.base.registry import imported_when_used
 
 if TYPE_CHECKING:
     from pentapod.job.advice.options import AdviceOptions as AdviceOptions
     from pentapod.job.advice.search import Advised as Advised
-    from pentapod.job.advise import advise as advise
+    from pentapod.job.advice_on_errors import advise as advise
     from pentapod.job.outcome import Outcome as Outcome
     from pentapod.job.pipeline import run as run
     from pentapod.job.schema.job import Job as Job
     from pentapod.job.verdict import judge as judge
 
 _HOMES = {
-    "Advised": "advice.search",
-    "AdviceOptions": "advice.options",
-    "Job": "schema.job",
-    "Outcome": "outcome",
-    "advise": "advise",
-    "judge": "verdict",
-    "run": "pipeline",
+    "job.advice.options": "AdviceOptions",
+    "job.advice.search": "Advised",
+    "job.advice_on_errors": "advise",
+    "job.outcome": "Outcome",
+    "job.pipeline": "run",
+    "job.schema.job": "Job",
+    "job.verdict": "judge",
 }
 
-__all__ = ["AdviceOptions", "Advised", "Job", "Outcome", "advise", "judge", "run"]
-
-
-def __getattr__(name: str) -> Any:
-    """Import a name of `__all__`. Raises AttributeError for others."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'pentapod.job' has no attribute {name!r}")
-    value = getattr(import_module(f"pentapod.job.{_HOMES[name]}"), name)
-    globals()[name] = value
-    return value
+if not TYPE_CHECKING:  # type checkers read the imports above
+    __getattr__, __dir__, __all__ = imported_when_used(__name__, _HOMES)

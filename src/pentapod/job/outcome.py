@@ -9,6 +9,7 @@ from typing import Any, Self, TypeVar
 from pentapod.base.refusal import Refusal
 from pentapod.base.values import Result, Value
 from pentapod.job.schema.job import Job
+from pentapod.job.stage_runner import Stage
 from pentapod.machine.machine import Machine
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.program.program import Program
@@ -17,20 +18,6 @@ from pentapod.verify.claims.pieces import WHOLE
 from pentapod.verify.verdict.verdict import NO_SOURCES, Certificate, Place, Sources, Verdict
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True)
-class Stage(Value):
-    """A stage that ran. value: its result, or a tuple of several; remark: a text about it."""
-
-    name: str
-    seconds: float
-    value: Any
-    remark: str = ""
-
-    def with_value(self, value: Any) -> Self:
-        """Return the stage with another result."""
-        return replace(self, value=value)
 
 
 @dataclass(frozen=True)

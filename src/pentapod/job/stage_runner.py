@@ -1,15 +1,33 @@
-"""StageRunner: runs stages and records them."""
+"""StageRunner: runs stages and records them. It imports none of them."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, Self, TypeVar
 
 from pentapod.base.progress import Progress
-from pentapod.job.outcome import Stage
+from pentapod.base.values import Value
 
 T = TypeVar("T")
+
+INTERRUPTED = "interrupted"
+"""The word by which a search says that an interruption ended it, and the best so far is kept."""
+
+
+@dataclass(frozen=True)
+class Stage(Value):
+    """A stage that ran. value: its result, or a tuple of several; remark: a text about it."""
+
+    name: str
+    seconds: float
+    value: Any
+    remark: str = ""
+
+    def with_value(self, value: Any) -> Self:
+        """Return the stage with another result."""
+        return replace(self, value=value)
 
 
 class StageRunner:
@@ -28,3 +46,14 @@ class StageRunner:
         self.stages.append(Stage(name, seconds, value, remark(value)))
         self.progress(name, 1.0)
         return value
+
+
+def ending_when_interrupted(progress: Progress) -> Progress:
+    """Return a progress that raises KeyboardInterrupt once a search was interrupted, instead of going on."""
+
+    def shown(stage: str, fraction: float, note: str = "") -> None:
+        progress(stage, fraction, note)
+        if note.startswith(INTERRUPTED):
+            raise KeyboardInterrupt
+
+    return shown

@@ -5,16 +5,15 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-from pentapod.base.progress import Progress
 from pentapod.base.refusal import Refusal
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.job.build.limits import placement_limits
+from pentapod.job.build.placed_check import Ranges, meetings, refusal_of
 from pentapod.job.build.placement import job_weights
 from pentapod.job.build.toolpath import drops_gouges
-from pentapod.job.placed_check import Ranges, meetings, refusal_of
 from pentapod.job.plan_before import PlanBefore
 from pentapod.job.schema.job import Job
-from pentapod.job.stage_runner import StageRunner
+from pentapod.job.stage_runner import INTERRUPTED, StageRunner
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
 from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
@@ -34,20 +33,6 @@ UPRIGHT = "the tool does not lean, as it would touch the part"
 
 STRAIGHT = "the tool keeps one direction, as it would touch the part"
 """What is said of a placement with one axis everywhere."""
-
-INTERRUPTED = "interrupted"
-"""The word by which a search says that an interruption ended it, and the best so far is kept."""
-
-
-def ending_when_interrupted(progress: Progress) -> Progress:
-    """Return a progress that raises KeyboardInterrupt once a search was interrupted, instead of going on."""
-
-    def shown(stage: str, fraction: float, note: str = "") -> None:
-        progress(stage, fraction, note)
-        if note.startswith(INTERRUPTED):
-            raise KeyboardInterrupt
-
-    return shown
 
 
 def explanation(

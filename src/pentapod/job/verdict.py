@@ -9,6 +9,7 @@ from pentapod.base.errors import ProgramError
 from pentapod.base.progress import Progress, silent
 from pentapod.job.artefacts import PROGRAM, SETUPS
 from pentapod.job.build.pieces import job_of_program, job_part, program_piece, program_toolpath
+from pentapod.job.build.reach import check_reach
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
@@ -38,7 +39,7 @@ def judge(
     path = Path(program)
     files = _programs(path) if path.is_dir() else [path]
     used, own_machine, mesh = job_machine(job, machine), machine is not None, job_mesh(job, progress)
-
+    check_reach(job, used, mesh)
     if not path.is_dir() or (path / PROGRAM).is_file():
         job = job_of_program(job, files[0])
         specification = job_specification(

@@ -122,7 +122,7 @@ class Patch:
             if size <= longest:
                 break
             size = max(0.5 * size, longest)
-        return patch, np.asarray(tree.query(patch.vertices)[0]) < width
+        return patch, np.isfinite(np.asarray(tree.query(patch.vertices, distance_upper_bound=width)[0]))
 
     def _halved(self, long: Bools) -> Patch:
         """Return the patch with the sides (F, 3) in `long` cut in the middle; neighbours agree on which."""

@@ -14,7 +14,7 @@ from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.cli.main import run as run_cli
 from pentapod.job import AdviceOptions, Job, advise, run
 from pentapod.job.advice.search import Advised, advised
-from pentapod.job.advise import can_help
+from pentapod.job.advice_on_errors import can_help
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.pipeline import passes
@@ -54,7 +54,7 @@ def test_a_refusal_holds_advice_that_passes(make_job, tmp_path, capsys):
     assert run(pasted(job, advice), tmp_path / "again", advice=None).passed
 
 
-def test_an_error_about_the_size_is_followed_by_advice(make_job, tmp_path, capsys):
+def test_an_error_about_the_size_is_followed_by_advice_where_it_is_asked_for(make_job, tmp_path, capsys):
     job = make_job(
         METRES, ('mode = "fixed"', 'mode = "free" #'), ("position_mm", "# position_mm"), ("rotation", "# rotation")
     )
@@ -62,6 +62,9 @@ def test_an_error_about_the_size_is_followed_by_advice(make_job, tmp_path, capsy
     said = capsys.readouterr()
     assert said.err.startswith("error: ")
     assert 'unit = "mm"' in said.err
+    assert said.out == ""  # the message says what to change: nobody waits for a search
+    assert run_cli(["plan", str(job), "-o", str(tmp_path / "out"), "--json", "--advice", "1"]) == 2
+    said = capsys.readouterr()
     (found,) = json.loads(said.out)["advice"]
     assert found["changes"]["part"] == {"unit": "mm"}
     assert not (tmp_path / "out").exists()

@@ -11,7 +11,7 @@ from pentapod.job.advice.options import OPTIONS
 from pentapod.job.advice.places import places
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.build.placement import job_constraints
-from pentapod.job.build.toolpath import job_tool
+from pentapod.job.build.tool import job_tool
 from pentapod.job.build.values import job_machine, job_mesh
 from refused_jobs import REFUSED
 

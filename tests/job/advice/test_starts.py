@@ -8,7 +8,7 @@ from pentapod.base.errors import InputError
 from pentapod.job import Job
 from pentapod.job.advice.options import OPTIONS
 from pentapod.job.advice.starts import starts
-from pentapod.job.advise import can_help
+from pentapod.job.advice_on_errors import can_help
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from refused_jobs import REFUSED
@@ -32,3 +32,16 @@ def test_the_first_start_is_what_is_wrong(name, tmp_path):
     assert first.changes[table][key] == value
     assert first.words
     assert len(job_toolpath(first.job, first.mesh, machine=machine)[0]) > 2
+
+
+def test_cuts_of_a_file_that_gouge_are_lifted_before_anything_else_is_tried(tmp_path):
+    job = Job.load(REFUSED["toolpath from a file, leaning"].write(tmp_path))
+    machine, mesh = job_machine(job), job_mesh(job)
+    (start,) = starts(job, machine, mesh, OPTIONS)
+    assert start.changes == {"gouge": {"remedy": ["lift"]}}
+    own, lifted = job_toolpath(job, mesh, machine=machine)[0], start.toolpath
+    raised = ((lifted.tips - own.tips) * own.axes).sum(axis=1)
+    assert raised.max() > 1e-4
+    assert raised.min() >= 0.0
+    (start,) = starts(start.job, machine, mesh, OPTIONS)  # they are clear now
+    assert not start.changes

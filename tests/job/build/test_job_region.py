@@ -119,3 +119,12 @@ def test_no_tip_is_farther_from_another_than_the_reach():
     assert max(np.linalg.norm(middles - tip, axis=1).min() for tip in tips[:500]) <= radius
     apart = np.linalg.norm(tips[:, None] - tips[None, ::20], axis=2).max()
     assert 0.5 * reach(machine) < apart <= reach(machine)
+
+
+def test_a_wrong_unit_is_told_where_the_box_in_the_right_one_holds_nothing(make_job):
+    """A box of some millimetres beside the origin: no part of the region lies in it once the numbers are inches."""
+    box = "\nregion_box_mm = [[25, 25, -99], [60, 60, 99]]"
+    inch = make_job((UNIT, 'unit = "m"' + box.replace("-99", "30")))
+    with pytest.raises(JobError, match=r'part.unit: .*unit = "mm"\?'):
+        checked(inch)
+    checked(make_job((UNIT, UNIT + box)))

@@ -25,7 +25,8 @@ from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.parts import Regions
 from pentapod.job.advice.trials import Tell, Trial, merged
 from pentapod.job.build.specification import job_coverage
-from pentapod.job.build.toolpath import drops_gouges, job_tool, job_toolpath
+from pentapod.job.build.tool import job_tool
+from pentapod.job.build.toolpath import drops_gouges, job_toolpath
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh

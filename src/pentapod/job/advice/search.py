@@ -17,7 +17,7 @@ from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.advice.starts import starts
 from pentapod.job.advice.trials import FEWEST, Tell, Trial, Trials, joined, merged
-from pentapod.job.build.toolpath import job_tool
+from pentapod.job.build.tool import job_tool
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
@@ -116,10 +116,11 @@ def _trials(
     for start in starts(job, machine, mesh, options, has_toolpath=toolpath is not None):
         tell(start.words)
         tool = job_tool(start.job, machine)
-        if toolpath is None or start.changes:
+        path = start.toolpath if start.changes else toolpath
+        if path is None:
             sketch = Sketch.of_region(start.job, start.mesh, tool, options.points)
         else:
-            sketch = Sketch.of_toolpath(job, mesh, tool, toolpath, options.points)
+            sketch = Sketch.of_toolpath(start.job, start.mesh, tool, path, options.points)
         if sketch is None or len(sketch.contacts) < FEWEST:
             continue
         trials = Trials(start.job, machine, start.mesh, sketch, options, tell)

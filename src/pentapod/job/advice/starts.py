@@ -14,29 +14,35 @@ from pentapod.geometry.directions import normalised
 from pentapod.job.advice.axes import OF_MODES, Changes, taken_out
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.build.region import covers_region, job_region
-from pentapod.job.build.toolpath import job_toolpath
+from pentapod.job.build.toolpath import job_toolpath, removes_gouges
 from pentapod.job.build.values import job_mesh
 from pentapod.job.schema.job import Job
-from pentapod.job.schema.strategies import strategy_table
+from pentapod.job.schema.strategies import FILE, strategy_table
 from pentapod.machine.machine import Machine
 from pentapod.mesh.io.load import UNITS
 from pentapod.mesh.io.registry import states_unit
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.region_share import RegionShare
+from pentapod.toolpath.gouge.report import GougeReport
+from pentapod.toolpath.toolpath import Toolpath
 
 _SIDES = tuple(tuple(sign if k == axis else 0.0 for k in range(3)) for axis in (2, 0, 1) for sign in (1.0, -1.0))
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A job to begin with. words, changes: empty for the job as it is. kept: as in `Advice`."""
+    """A job to begin with. words, changes: empty for the job as it is. kept: as in `Advice`.
+
+    toolpath: of this job, where it is not made from the region.
+    """
 
     words: str
     changes: Changes
     job: Job
     mesh: Mesh
     kept: float = 1.0
+    toolpath: Toolpath | None = None
 
 
 def starts(
@@ -53,7 +59,7 @@ def starts(
         yield repaired  # any other change would cut into the part from outside its walls
         return
     if not covers_region(job):
-        yield own
+        yield _lifted(own, machine) or own
         return
     region = RegionShare.of(mesh, job_region(job)).inside > 0.0
     if region:
@@ -71,6 +77,26 @@ def _has_toolpath(start: Start, machine: Machine) -> bool:
     except InputError:
         return False
     return True
+
+
+def _lifted(own: Start, machine: Machine) -> Start | None:
+    """Return a job whose toolpath was read and gouges, as every plan of it would, with its cuts lifted off the part."""
+    if own.job.toolpath.strategy != FILE or removes_gouges(own.job):
+        return None
+    changes: Changes = {"gouge": {"remedy": ["lift"]}}
+    with suppress(InputError):
+        if not any(report.gouging for report in _gouges(own.job, own.mesh, machine)[1]):
+            return None
+        job = own.job.with_(**changes)
+        toolpath, reports = _gouges(job, own.mesh, machine)
+        if all(report.left == 0 for report in reports):
+            return Start("cuts that gouge lifted off the part", changes, job, own.mesh, toolpath=toolpath)
+    return None
+
+
+def _gouges(job: Job, mesh: Mesh, machine: Machine) -> tuple[Toolpath, list[GougeReport]]:
+    toolpath, reports = job_toolpath(job, mesh, machine=machine)
+    return toolpath, [report for report in reports.parts if isinstance(report, GougeReport)]
 
 
 def _with_other_paths(job: Job, machine: Machine, mesh: Mesh, options: AdviceOptions) -> Iterator[Start]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from pentapod.job.advice.sketch import Sketch
 from pentapod.job.build.limits import placement_limits
 from pentapod.job.build.placement import job_weights
 from pentapod.job.build.specification import job_collision_world
-from pentapod.job.build.toolpath import job_tool
+from pentapod.job.build.tool import job_tool
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
@@ -113,19 +113,22 @@ class Trials:
 
     def _keeping_all(self, own: bool) -> Iterator[Trial]:
         """Yield changes of tool axes and placement; the cheapest to plan first, once they fit comfortably."""
-        o = self.options
         for place in self.places:
-            scant: list[Setting] = []
-            for axis in (axis for axis in self.axes if place is self.places[0] or not axis.narrow):
-                setting = self._setting(axis, place)
-                if not (own or setting.words) or setting.found.margin < o.enough:
-                    continue
-                if setting.found.margin < o.comfortable:
-                    scant.append(setting)
-                else:
-                    yield Trial(setting.words, setting.changes, 1.0, 1.0)
-            for setting in sorted(scant, key=lambda s: -s.found.margin):
+            yield from islice(self._in_place(place, own), self.options.failures)
+
+    def _in_place(self, place: Place, own: bool) -> Iterator[Trial]:
+        """Yield other tool axes with one placement; those that fit comfortably as soon as they are found."""
+        scant: list[Setting] = []
+        for axis in (axis for axis in self.axes if place is self.places[0] or not axis.narrow):
+            setting = self._setting(axis, place)
+            if not (own or setting.words) or setting.found.margin < self.options.enough:
+                continue
+            if setting.found.margin < self.options.comfortable:
+                scant.append(setting)
+            else:
                 yield Trial(setting.words, setting.changes, 1.0, 1.0)
+        for setting in sorted(scant, key=lambda s: -s.found.margin):
+            yield Trial(setting.words, setting.changes, 1.0, 1.0)
 
     def _setting(self, axis: AxisChoice, place: Place) -> Setting:
         self.tell(joined(axis.words, place.words))

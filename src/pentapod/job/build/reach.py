@@ -8,7 +8,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.units import from_si
 from pentapod.cutters.tool import Tool
 from pentapod.job.build.region import covers_region, job_region
-from pentapod.job.build.toolpath import job_tool
+from pentapod.job.build.tool import job_tool
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.machine.reach import reach
@@ -23,7 +23,8 @@ def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
 
     In one set-up all tips are nearer to each other than `reach`. So the job cannot be done where the region has more
     points, each farther than that from the others, than set-ups; twice the distance of tips from their contacts and a
-    stepover at each end are allowed for. Lines that cover no region may lie anywhere on the part, and pass.
+    stepover at each end are allowed for. Lines that cover no region may lie anywhere on the part, and pass. An empty
+    region of a part whose unit is doubtful raises, too: the region's box may be in the right unit.
     """
     if not covers_region(job):
         return
@@ -33,7 +34,7 @@ def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
         return
     region = Patch.of(mesh, job_region(job))
     points = region.vertices[np.unique(region.faces)]
-    if _far_apart(points, apart, job.placement.setups + 1) <= job.placement.setups:
+    if len(points) and _far_apart(points, apart, job.placement.setups + 1) <= job.placement.setups:
         return
     extents = np.ptp(mesh.bounds, axis=0)
     size, width = (f"{from_si(value, 'mm'):,.0f} mm" for value in (extents.max(), machine.work.diameter))
@@ -43,6 +44,8 @@ def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
         unit = min(UNITS, key=lambda name: abs(np.log(extents.max() * UNITS[name] / known / machine.work.diameter)))
         key = "scale" if unit == job.part.unit else "unit"
         remedy = None if unit == job.part.unit else f'unit = "{unit}"?'
+    if not len(points) and key == "scale":
+        return
     raise job.error(
         "part", key, f"the part is {size} wide, the work volume {width}",
         expected=f"places to machine that are at most {from_si(apart, 'mm'):,.0f} mm from each other", remedy=remedy,

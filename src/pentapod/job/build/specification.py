@@ -11,9 +11,9 @@ import numpy as np
 from pentapod.base.errors import InputError, MachineError
 from pentapod.base.files import sha256_of
 from pentapod.job.build.placement import job_constraints
-from pentapod.job.build.reach import check_reach
 from pentapod.job.build.region import covers_region, job_region
-from pentapod.job.build.toolpath import job_depth, job_options, job_tool, job_toolpath, tool_in_world
+from pentapod.job.build.tool import job_tool
+from pentapod.job.build.toolpath import job_depth, job_options, job_toolpath, tool_in_world
 from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import Component
 from pentapod.machine.clearance.collision_world import CollisionWorld
@@ -39,7 +39,6 @@ def job_specification(
     whether the machine is a value of the caller, of no file.
     Raises JobError where tables of the job do not go with the machine or the mesh.
     """
-    check_reach(job, machine, mesh)
     collision_world, constraints = job_collision_world(job, machine, mesh), job_constraints(job, machine, mesh)
     cutting, component = job_cutting(job, collision_world, machine), job.placement.component
     return Specification(

@@ -8,19 +8,17 @@ from typing import Any, cast
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
-from pentapod.base.keys import fields_from, file_key
+from pentapod.base.keys import fields_from
 from pentapod.base.progress import Progress, silent
 from pentapod.base.units import from_si
 from pentapod.cutters.ball import BallCutter
 from pentapod.cutters.mounted import BallEnded, Mounted
-from pentapod.cutters.registry import CUTTERS
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.solids import Cone
 from pentapod.job.build.region import covers_region, job_region, region_report
-from pentapod.job.build.values import job_machine
+from pentapod.job.build.tool import job_tool
 from pentapod.job.schema.job import Job
 from pentapod.job.schema.strategies import FILE
 from pentapod.machine.machine import Machine
@@ -60,23 +58,6 @@ class Reports:
 
     def __str__(self) -> str:
         return "\n".join(str(part) for part in self.parts)
-
-
-def job_tool(job: Job, machine: Machine | None = None) -> Tool:
-    """Return the job's tool, by default with a stem up to the spindle: see `Mounted.with_stem`.
-
-    machine: the one to use instead of the machine that the job names. Raises JobError where its sizes make no tool.
-    """
-    cutter = CUTTERS[job.tool.type]
-    mounted = {"shank": _cones(job.tool.si.shank), "holder": _cones(job.tool.si.holder)}
-    try:
-        tool = cutter(**fields_from(cutter, job.tool), **mounted)
-    except ToolpathError as error:
-        key = file_key(cutter, error.key or "") or "type"
-        raise job.error("tool", key, error.what, expected=error.expected) from error
-    if isinstance(tool, Mounted):
-        tool = cast(Any, tool).with_stem(job_machine(job, machine).bodies.shaft_end)
-    return tool
 
 
 def stem_sentence(tool: Tool) -> str:
@@ -197,6 +178,11 @@ def drops_gouges(job: Job) -> bool:
     return Remedy.DROP in _remedies(job)
 
 
+def removes_gouges(job: Job) -> bool:
+    """Return whether anything is done about gouges of the toolpath; else they are only reported."""
+    return _remedies(job) != (Remedy.REPORT,)
+
+
 def job_link_style(job: Job, mesh: Mesh, toolpath: Toolpath) -> LinkStyle:
     """Return the style of additional links: along the axis and over the clearance level."""
     view = normalised(job.part.si.region_direction)
@@ -251,8 +237,3 @@ def job_axis_mode(job: Job) -> AxisMode:
     if axis.mode == "between":
         return Between(axis.places, np.array(axis.directions))
     return Normal()
-
-
-def _cones(pieces: Floats | None) -> tuple[Cone, ...]:
-    """Return the pieces of a shank or holder from rows of height, lower and upper diameter."""
-    return () if pieces is None else tuple(Cone(height, 0.5 * low, 0.5 * high) for height, low, high in pieces.tolist())

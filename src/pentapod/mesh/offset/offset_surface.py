@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -136,6 +135,8 @@ def _nodes(tree: FacetTree, grid: Grid, groups: Ints, level: float) -> tuple[Int
 
 def _reached(nodes: Nodes, edges: Edges, wide: Bools) -> Bools:
     """Return which nodes (N,) outside are connected, along edges of the grid, with what is beyond its border."""
+    from scipy import ndimage  # noqa: PLC0415  slow, and commands that draw nothing load this file
+
     keys, outside = nodes.keys, nodes.outside
     both = outside[edges.first] & outside[edges.last]
     pairs = [np.stack([edges.first[both], edges.last[both]])]

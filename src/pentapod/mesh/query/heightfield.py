@@ -17,11 +17,13 @@ from pentapod.mesh.mesh import Mesh
 class HeightGridOptions:
     """facets_per_cell: on average. most_entries: of facets in cells; a coarser grid is made where there were more.
 
-    sideways: metres to both sides of a point at which `hides` looks.
+    most_pairs: about how many pairs of points and facets are looked at together. sideways: metres to both sides of a
+    point at which `hides` looks.
     """
 
     facets_per_cell: float = 2.0
     most_entries: int = 20_000_000
+    most_pairs: int = 4_000_000
     sideways: float = 1e-7
 
 
@@ -74,16 +76,20 @@ class HeightField:
         negative, only the interior of facets counts.
         """
         local = points @ self._frame.T
-        query, facet, weights = self._candidates(local[:, :2], margin)
-        height = (weights * self._local[:, 2][self.mesh.faces[facet]]).sum(axis=1)
-        order = np.lexsort((facet, -height, query))
-        best = order[np.flatnonzero(np.diff(query[order], prepend=-1))]
         surface, normals = np.full((2, len(points), 3), np.nan)
         heights = np.full(len(points), -np.inf)
-        who, what, share = query[best], facet[best], weights[best][:, :, None]
-        heights[who] = height[best]
-        surface[who] = (share * self.mesh.vertices[self.mesh.faces[what]]).sum(axis=1)
-        normals[who] = (share * self.mesh.corner_normals[what]).sum(axis=1)
+        begin, count = self._facets_near(local[:, :2])
+        # Where many facets stand over each other, the pairs of points and facets would fill the memory.
+        share = np.cumsum(count) // OPTIONS.most_pairs
+        for rows in np.split(np.arange(len(points)), np.flatnonzero(np.diff(share)) + 1):
+            query, facet, weights = self._candidates(local[rows, :2], begin[rows], count[rows], margin)
+            height = (weights * self._local[:, 2][self.mesh.faces[facet]]).sum(axis=1)
+            order = np.lexsort((facet, -height, query))
+            best = order[np.flatnonzero(np.diff(query[order], prepend=-1))]
+            who, what, weight = rows[query[best]], facet[best], weights[best][:, :, None]
+            heights[who] = height[best]
+            surface[who] = (weight * self.mesh.vertices[self.mesh.faces[what]]).sum(axis=1)
+            normals[who] = (weight * self.mesh.corner_normals[what]).sum(axis=1)
         return surface, normals, heights
 
     def hides(self, points: Floats, slack: float) -> Bools:
@@ -96,9 +102,9 @@ class HeightField:
         height = points @ self.view + slack
         return (self.topmost(points + sideways)[2] > height) & (self.topmost(points - sideways)[2] > height)
 
-    def _candidates(self, points: Floats, margin: float) -> tuple[Ints, Ints, Floats]:
-        """Return pairs (M,), (M,) of points and facets over each other, and barycentric weights (M, 3)."""
-        cell, shape, begins, facets = self._grid
+    def _facets_near(self, points: Floats) -> tuple[Ints, Ints]:
+        """Return where the facets of the points' cells begin in the grid's facets, and how many they are (N,)."""
+        cell, shape, begins, _ = self._grid
         place = np.floor((points - self._low) / cell)
         # Points on the upper edge of the grid belong to the last cell.
         rim = (points - self._low <= self._extent * (1.0 + 1e-9)) & (place >= shape)
@@ -106,9 +112,12 @@ class HeightField:
         index = np.where((index < 0) & (points - self._low >= -1e-9 * self._extent), 0, index)
         inside = ((index >= 0) & (index < shape)).all(axis=1)
         key = np.where(inside, index[:, 0] * shape[1] + index[:, 1], 0).astype(np.intp)
-        count = np.where(inside, begins[key + 1] - begins[key], 0)
+        return begins[key], np.where(inside, begins[key + 1] - begins[key], 0)
+
+    def _candidates(self, points: Floats, begin: Ints, count: Ints, margin: float) -> tuple[Ints, Ints, Floats]:
+        """Return pairs (M,), (M,) of points and facets over each other, and barycentric weights (M, 3)."""
         query, number = members(count)
-        facet = facets[number + begins[key][query]]
+        facet = self._grid[3][number + begin[query]]
         a, b, c = (self._local[self.mesh.faces[facet, k]][:, :2] for k in range(3))
         p, doubled = points[query], self._doubled[facet]
         weights = np.stack([_cross(c - b, p - b), _cross(a - c, p - c), _cross(b - a, p - a)], axis=1)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from scipy.ndimage import map_coordinates
 
 from pentapod.base.arrays import Bools, Floats, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
@@ -129,6 +128,8 @@ def image_paths(surface: Surface, options: ImageOptions) -> ContactPaths:
 
 def _darkness_at(darkness: Floats, pixel: float, plane: Floats) -> Floats:
     """Return the darkness (N,) at points (N, 2) of the picture, metres from its middle: bilinear interpolation."""
+    from scipy.ndimage import map_coordinates  # noqa: PLC0415  slow, and few jobs have a picture
+
     rows, columns = darkness.shape
     column = np.clip(plane[:, 0] / pixel + 0.5 * columns - 0.5, 0.0, columns - 1.0)
     row = np.clip(0.5 * rows - plane[:, 1] / pixel - 0.5, 0.0, rows - 1.0)

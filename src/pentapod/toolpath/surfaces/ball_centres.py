@@ -12,6 +12,8 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats
 from pentapod.base.values import Value
 from pentapod.geometry.directions import normalised
+from pentapod.geometry.runs import marked_runs
+from pentapod.mesh.normals import unit_or_zero
 from pentapod.mesh.offset.offset_surface import onto_level
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.query.tree import FacetTree
@@ -24,14 +26,16 @@ class DriveOptions(Value):
     step: of the grid, as a share of the ball's radius. parts: how many times finer it is in channels between its
     nodes; narrower ones may be closed. on_level: as a share of the radius, how near to the offset a point is put.
     rounds: of moving it there, and of halving chords. window: length over which normals are averaged along a line,
-    as a share of the radius: at creases they jump. border: how exactly an open border is known, as a share of the
-    radius; enters: how far beyond it the ball gets where it is no hole. longest: of a link on the surface, as a
-    multiple of the straight way; uneven: of its longest step. around: longest link around what is in the way, as a
-    multiple of the straight way and twice the clearance. beside, sideways: distances around a point at both of which
-    the surface above must hide it, above: by which height, all as shares of the radius: walls, and valleys between
-    steep flanks, do not hide themselves, nor do walls that lean under by less. under: the same as `sideways` for links,
-    which may lead a little farther; upright: and for those between ends over which nothing leans. evened: how often the
-    stepover for a scallop is averaged with that of neighbouring facets, whose curvature is noisy.
+    as a share of the radius: at creases they jump. side: how far beside a line both sides of a corner are looked
+    for, as a share of the radius; corner: angle between them, radians, from which they are two. border: how exactly
+    an open border is known, as a share of the radius; enters: how far beyond it the ball gets where it is no hole.
+    longest: of a link on the surface, as a multiple of the straight way; uneven: of its longest step. around:
+    longest link around what is in the way, as a multiple of the straight way and twice the clearance. beside,
+    sideways: distances around a point at both of which the surface above must hide it, above: by which height, all
+    as shares of the radius: walls, and valleys between steep flanks, do not hide themselves, nor do walls that lean
+    under by less. under: the same as `sideways` for links, which may lead a little farther; upright: and for those
+    between ends over which nothing leans. evened: how often the stepover for a scallop is averaged with that of
+    neighbouring facets, whose curvature is noisy.
     """
 
     step: float = 0.25
@@ -39,6 +43,8 @@ class DriveOptions(Value):
     on_level: float = 1e-7
     rounds: int = 30
     window: float = 1.0
+    side: float = 0.02
+    corner: float = float(np.radians(5.0))
     border: float = 0.02
     enters: float = 0.5
     longest: float = 2.5
@@ -156,6 +162,30 @@ class BallCentres:
         """Return unit normals (N, 3) of the offset at points on it: away from the part's closest points."""
         return normalised(self.tree.closest(points)[1])
 
+    def midway(self, passes: Passes) -> Passes:
+        """Return passes with normals midway between the two sides that the ball touches where they lead along a corner.
+
+        One of the two is as near as the other there: which one is found changes from point to point. Where a pass only
+        crosses a corner, its normals stay.
+        """
+        if not len(passes):
+            return passes
+        side = unit_or_zero(np.cross(self._along(passes), passes.normals)) * self.options.side * self.radius
+        left, right = self.normals(passes.points - side), self.normals(passes.points + side)
+        cosine = np.einsum("ni,ni->n", left, right)
+        corner = (cosine < np.cos(self.options.corner)) & (cosine > -np.cos(self.options.corner))
+        place = places(passes)[0]
+        for a, b in marked_runs(corner).tolist():
+            corner[a:b] = place[b - 1] - place[a] > 0.5 * self.options.window * self.radius
+        return replace(passes, normals=np.where(corner[:, None], unit_or_zero(left + right), passes.normals))
+
+    def _along(self, passes: Passes) -> Floats:
+        """Return the direction (N, 3) of passes at their points, over half a window."""
+        place, first, last = places(passes)
+        half = 0.25 * self.options.window * self.radius
+        ahead, back = np.minimum(place + half, last), np.maximum(place - half, first)
+        return np.stack([np.interp(ahead, place, p) - np.interp(back, place, p) for p in passes.points.T], axis=1)
+
     def clear(self, starts: Floats, ends: Floats, least: float) -> Bools:
         """Return which chords (M,) are nowhere nearer to the part than `least` metres."""
         from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415  loads numba
@@ -168,10 +198,16 @@ class BallCentres:
         return facets < 0
 
 
+def places(passes: Passes) -> tuple[Floats, Floats, Floats]:
+    """Return how far along all passes each point is (N,), metres, and where its pass begins and ends."""
+    place = np.concatenate([[0.0], np.cumsum(np.where(passes.within, passes.steps, 0.0))])
+    owner = passes.pass_of_point
+    return place, place[passes.starts[:-1]][owner], place[passes.starts[1:] - 1][owner]
+
+
 def smoothed(passes: Passes, window: float) -> Floats:
     """Return unit normals (N, 3) of passes, averaged along each over `window` metres, less near its ends."""
-    place = np.concatenate([[0.0], np.cumsum(np.where(passes.within, passes.steps, 0.0))])
-    first, last = place[passes.starts[:-1]][passes.pass_of_point], place[passes.starts[1:] - 1][passes.pass_of_point]
+    place, first, last = places(passes)
     half = np.minimum(0.5 * window, np.minimum(place - first, last - place))
     middles = 0.5 * (passes.normals[1:] + passes.normals[:-1]) * passes.steps[:, None]
     sums = np.concatenate([np.zeros((1, 3)), np.cumsum(middles, axis=0)])

@@ -127,10 +127,11 @@ class DriveSurface:
     def waypoints(self, passes: Passes, options: PathOptions) -> Passes:
         """Return contacts and unit normals for lines on the drive surface, their centres put exactly on the offset.
 
-        The normals are averaged along each pass. Where they jump, at creases, a contact is the point of the ball in the
-        direction of the mean normal, so that the centre is where it should be.
+        Along a corner the normals are midway between its sides; they are averaged along each pass. Where they jump, a
+        contact is the point of the ball in the direction of the mean normal, so that the centre is where it should be.
         """
         exact = self.centres.exact(passes, options.chordal, min(options.closest, options.chordal))
+        exact = self.centres.midway(exact)
         normals = smoothed(exact, self.options.window * self.radius)
         return replace(exact, points=exact.points - self.radius * normals, normals=normals)
 
@@ -230,12 +231,16 @@ class DriveSurface:
         edge = np.repeat(np.arange(len(count)), count)
         share = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)) / (count - 1)[edge]
         border = corners[edge, 0] + share[:, None] * (corners[edge, 1] - corners[edge, 0])
-        near = KDTree(border).query(patch.vertices - away)[0]
+        # Farther from the border than any vertex next to a crossing, the distance makes no difference: a search that
+        # is not bounded takes long in the middle of a straight border, where much of it is about as near.
+        sides = np.stack([patch.faces, np.roll(patch.faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+        longest = np.linalg.norm(patch.vertices[sides[:, 1]] - patch.vertices[sides[:, 0]], axis=1).max(initial=0.0)
+        far = longest + 2.0 * self.radius + step
+        near = np.minimum(KDTree(border).query(patch.vertices - away, distance_upper_bound=far)[0], far)
         upright = np.einsum("ni,ni->n", self.part.facet_normals[self.centres.tree.facets[facet]], away)
         over = np.sqrt(np.maximum(gap**2 - upright**2, 0.0))
         beyond = np.where((near < step) & (over > step), over, -near)
         # A ball over a hole smaller than itself is beyond its border, but not far.
-        sides = np.stack([patch.faces, np.roll(patch.faces, -1, axis=1)], axis=-1).reshape(-1, 2)
         sides = sides[(beyond[sides] > 0.0).all(axis=1)]
         number, piece = components(len(beyond), sides[:, 0], sides[:, 1])
         furthest = np.full(number, -np.inf)

@@ -11,7 +11,7 @@ import toolpath_surfaces as surfaces
 from pentapod.cli.commands.new import dome_stl
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job, run, task
-from pentapod.job.placed_check import meetings
+from pentapod.job.build.placed_check import meetings
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.planning import PlacedPath, Placement, plan
 from pentapod.toolpath import BallCutter, Mesh, RasterOptions, make_toolpath

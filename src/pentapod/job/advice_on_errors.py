@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import TYPE_CHECKING
 
 from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress, silent
 from pentapod.job.advice.options import OPTIONS, AdviceOptions
-from pentapod.job.advice.search import Advised, advised
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.pipeline import passes
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
+
+if TYPE_CHECKING:
+    from pentapod.job.advice.search import Advised
 
 _KEYS = frozenset(("region", "gouge.remedy", "part.unit", "part.scale", "curve", "shallowest"))
 
@@ -29,5 +32,7 @@ def advise(
     For jobs for which `run` raises an error of those that `can_help` names; refusals hold their advice. Raises
     InputError for a bad job, mesh or machine.
     """
+    from pentapod.job.advice.search import advised  # noqa: PLC0415  slow, and most jobs need none
+
     used, mesh = job_machine(job, machine), job_mesh(job, progress)
     return advised(job, used, mesh, None, partial(passes, machine=machine), options, progress)

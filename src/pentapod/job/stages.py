@@ -1,0 +1,279 @@
+"""Stages of a job after its mesh was read: toolpath, plan, verdict, what is mended, set-ups, advice."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+
+from pentapod.base.errors import ToolpathError
+from pentapod.base.refusal import Refusal
+from pentapod.job.advice.options import AdviceOptions
+from pentapod.job.advice.search import TOUCHES, advised
+from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, write_arrays, write_json
+from pentapod.job.build.limits import timing_limits
+from pentapod.job.build.pieces import job_part, job_piece, job_without
+from pentapod.job.build.region import covers_region
+from pentapod.job.build.specification import job_specification
+from pentapod.job.build.toolpath import Reports, job_link_style, job_toolpath
+from pentapod.job.build.upright import may_stand, upright
+from pentapod.job.mending import OPTIONS as MENDING
+from pentapod.job.mending import mend_of, most_left_out
+from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
+from pentapod.job.plan_arrays import arrays_of
+from pentapod.job.plan_before import PlanBefore
+from pentapod.job.run_folder import unstaged
+from pentapod.job.schema.job import Job
+from pentapod.job.stage_runner import StageRunner
+from pentapod.job.task import Task
+from pentapod.job.withheld import STAGE, failures, foreseen, withheld
+from pentapod.machine.machine import Machine
+from pentapod.planning import PlacedPath
+from pentapod.planning.placement.placed_path import UnplacedPath
+from pentapod.planning.setups import setups
+from pentapod.timing import Limit
+from pentapod.toolpath import Mesh, Toolpath
+from pentapod.toolpath.linking.partition import Piece, missed_cuts
+from pentapod.verify import Claim, Verdict, judged
+from pentapod.verify.surface.surface_left import SURFACE_LEFT
+
+Writer = Callable[[Outcome, Path], object]
+
+STANDS = (
+    "went back: the tool stays upright, and passes end where the part leans over them, since no lean that was found "
+    "keeps it clear of the part"
+)
+"""What is said of a job that is done by an upright tool."""
+
+
+def planned(
+    job: Job,
+    machine: Machine,
+    mesh: Mesh,
+    runner: StageRunner,
+    staging: Path,
+    writers: Mapping[str, Writer],
+    *,
+    own_machine: bool,
+    piece: Piece | None,
+    before: PlanBefore | None,
+    limits: tuple[Limit, ...],
+    claims: tuple[Claim, ...],
+) -> tuple[Task, Outcome]:
+    """Plan a job whose mesh was read, write the files into `staging`, and return its task and its outcome.
+
+    machine, mesh: those of the job. own_machine: whether the machine is a value of the caller, of no file. Else as in
+    `pipeline.run`. Raises InputError.
+    """
+    specification = job_specification(
+        job, machine, mesh, lambda: _toolpath(job, machine, mesh, piece, runner, before), own_machine=own_machine
+    )
+    if piece is not None:  # the caller plans the other pieces elsewhere
+        specification = dataclasses.replace(specification, setups=max(specification.setups, 2))
+    left_out = () if before is None else before.left_out
+    task = Task(job, specification, runner, piece, (*timing_limits(job, machine), *limits), claims, before, left_out)
+    outcome = _foreseen(task, staging, writers) or _planned(task, staging, writers)
+    alone = piece is None and before is None and job.placement.setups == 1
+    if outcome.refusal is not None and alone and covers_region(job):
+        outcome = _mended(task, mesh, outcome, staging, writers)
+        if may_stand(job) and _touches(outcome):
+            outcome = _upright(task, mesh, outcome, staging, writers)
+    refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
+    if refusal is not None and refusal.stage == "placement" and splits:
+        outcome = _split(task, mesh, refusal, staging, writers)
+    return task, outcome
+
+
+def with_advice(
+    task: Task,
+    mesh: Mesh,
+    outcome: Outcome,
+    again: Callable[..., bool],
+    options: AdviceOptions,
+    staging: Path,
+    writers: Mapping[str, Writer],
+) -> Outcome:
+    """Search for changes with which a refused job is planned, and return the outcome whose refusal holds them.
+
+    again: plans a job and returns whether its verdict passes, as `pipeline.passes`.
+    """
+    refusal, runner = outcome.refusal, task.runner
+    if refusal is None:
+        return outcome
+    search = (task.job, task.machine, mesh, task.toolpath, again, options, runner.progress)
+    failed = failures(outcome.verdict) if refusal.stage == STAGE else {}
+    found = runner.run("advice", lambda: advised(*search, failed, refusal.diagnosis))
+    better = refusal.with_advice(found.advice, found.sentence)
+    runner.stages = [s if s.value is not refusal else s.with_value(better) for s in runner.stages]
+    verdict = outcome.verdict if failed else refusal_verdict(better, task.specification.sources)
+    return _written(task, verdict, staging, writers)
+
+
+def _toolpath(
+    job: Job, machine: Machine, mesh: Mesh, piece: Piece | None, runner: StageRunner, before: PlanBefore | None
+) -> Toolpath:
+    """Return the job's toolpath, or a piece of it, as a stage of the run."""
+
+    def made() -> tuple[Toolpath, object]:
+        if before is not None:
+            return before.toolpath, "toolpath of the run before"
+        if piece is None:
+            return job_toolpath(job, mesh, runner.progress, machine=machine)
+        return job_piece(job, mesh, piece, runner.progress, machine=machine), piece
+
+    return runner.run("toolpath", made, remark=lambda it: str(it[1]))[0]
+
+
+def _foreseen(task: Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome | None:
+    """Return the outcome of a toolpath whose program would fail its verdict; None where that is not known yet."""
+    made = next((stage.value for stage in task.runner.stages if stage.name == "toolpath"), None)
+    if made is None or not isinstance(made[1], Reports):  # a piece, or the toolpath of the run before
+        return None
+    refusal = foreseen(task.job, made[1])
+    if refusal is None:
+        return None
+    task.runner.stages.append(Stage("foreseen", 0.0, refusal))
+    return _written(task, refusal_verdict(refusal, task.specification.sources), staging, writers)
+
+
+def _planned(task: Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+    """Run the stages after the toolpath and the verification, write the files, and return the outcome."""
+    program, runner = task.program(staging / PROGRAM), task.runner
+    if isinstance(program, Refusal):
+        verdict = refusal_verdict(program, task.specification.sources)
+    else:
+        file = staging / PROGRAM
+        verdict = runner.run(
+            "verify", lambda: judged(file, task.specification, claims=task.claims, progress=runner.progress)
+        )
+        if (fails := withheld(verdict)) is not None:
+            runner.stages.append(Stage("withheld", 0.0, fails))
+            file.rename(staging / WITHHELD)
+    return _written(task, verdict, staging, writers)
+
+
+def _mended(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+    """Go back after a run that failed: do in another way what can be, and plan again from there.
+
+    Returns the first outcome that passes, else the failed one.
+    """
+    job, whole, outcome, mend, runner = task.job, task.toolpath, failed, None, task.runner
+    file = staging / WITHHELD
+    first = file.read_bytes() if file.is_file() else None
+    for _ in range(MENDING.rounds):
+        before, mend = mend, mend_of(whole, mend, outcome, most_left_out(job))
+        if mend is None:
+            break
+        own, placed, refused = StageRunner(runner.progress), outcome.find(PlacedPath), outcome.find(UnplacedPath)
+        start = placed if refused is None else refused.attempt
+        own.stages += [stage for stage in outcome.stages if stage.name in ("mesh", "toolpath", "placement")]
+        path = outcome.find(Toolpath) or whole
+        if mend.left_out != (() if before is None else before.left_out):
+            path, placed = job_without(job, mesh, whole, mend.left_out, machine=task.machine), None
+            own.stages = [
+                stage.with_value((path, *stage.value[1:])) if stage.name == "toolpath" else stage
+                for stage in own.stages
+                if stage.name != "placement"
+            ]
+        own.stages.append(Stage("mended", 0.0, mend, str(mend)))
+        specification = dataclasses.replace(task.specification, toolpath=path)
+        law, share = MENDING.law if mend.law else task.law, MENDING.closer if mend.closer else 1.0
+        again = dataclasses.replace(
+            task,
+            specification=specification,
+            runner=own,
+            left_out=mend.left_out,
+            law=law,
+            closer=share,
+            placed=placed,
+            start=start,
+        )
+        file.unlink(missing_ok=True)
+        outcome = _planned(again, staging, writers)
+        if outcome.passed:
+            runner.stages = own.stages
+            return outcome
+    if outcome is failed:
+        return failed
+    file.unlink(missing_ok=True)
+    if first is not None:
+        file.write_bytes(first)
+    return _written(task, failed.verdict, staging, writers)
+
+
+def _touches(outcome: Outcome) -> bool:
+    """Return whether a run failed since shank or holder touch the part."""
+    limits = () if outcome.refusal is None else [each.constraint for each in outcome.refusal.diagnosis]
+    return any(name.startswith(TOUCHES) for name in (*limits, *failures(outcome.verdict)))
+
+
+def _upright(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+    """Go back after a placement at which the tool touches the part, and plan the job with an upright tool.
+
+    Returns the failed outcome where that does not pass.
+    """
+    job, runner, file = upright(task.job), StageRunner(task.runner.progress), staging / WITHHELD
+    first = file.read_bytes() if file.is_file() else None
+    runner.stages += [stage for stage in task.runner.stages if stage.name == "mesh"]
+    runner.stages.append(Stage("upright", 0.0, None, STANDS))
+    own_machine = task.specification.sources.machine is None
+    make = partial(_toolpath, job, task.machine, mesh, None, runner, None)
+    try:
+        specification = job_specification(job, task.machine, mesh, make, own_machine=own_machine)
+    except ToolpathError:  # no cut is left
+        return failed
+    again = dataclasses.replace(task, job=job, specification=specification, runner=runner)
+    file.unlink(missing_ok=True)
+    outcome = _planned(again, staging, writers)
+    if not outcome.passed:
+        outcome = _mended(again, mesh, outcome, staging, writers)
+    if outcome.passed:
+        left = next(each.method for each in outcome.verdict.certificates if each.claim == SURFACE_LEFT)
+        runner.stages.append(Stage("left", 0.0, None, f"{SURFACE_LEFT}: {left.rsplit('; ', 1)[-1]}"))
+        task.runner.stages = runner.stages
+        return _written(again, outcome.verdict, staging, writers)
+    file.unlink(missing_ok=True)
+    if first is not None:
+        file.write_bytes(first)
+    return _written(task, failed.verdict, staging, writers)
+
+
+def _written(task: Task, verdict: Verdict, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+    """Write the files of a run but its program, and return the outcome."""
+    outcome = Outcome(task.job.asked or task.job, task.machine, tuple(task.runner.stages), verdict)
+    if (placed := outcome.find(PlacedPath)) is not None:
+        outcome = dataclasses.replace(outcome, machine=task.on(placed.placement).machine)
+    write_arrays(arrays_of(outcome, unstaged(staging)), staging / ARRAYS)
+    for name, write in writers.items():
+        task.runner.progress("report", 0.0, name)
+        write(outcome, staging / name)
+    write_json(outcome.to_dict(), staging / VERDICT)
+    return outcome
+
+
+def _split(task: Task, mesh: Mesh, refusal: Refusal, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
+    """Split a job that one placement cannot reach into set-ups, each in a folder of its own; or refuse it."""
+    job, toolpath, runner = task.job, task.toolpath, task.runner
+    # The refusal is not part of the outcome.
+    runner.stages = [stage for stage in runner.stages if stage.value is not refusal]
+    style = job_link_style(job, mesh, toolpath)
+    search = (toolpath, task.fits, style, job.placement.setups, refusal, runner.progress)
+    found = runner.run("set-ups", lambda: setups(*search))
+    if isinstance(found, Refusal):
+        return _written(task, refusal_verdict(found, task.specification.sources), staging, writers)
+    cutting, missed = missed_cuts(toolpath, found)
+    parts: list[SetUp] = []
+    before = [stage for stage in runner.stages if stage.name not in ("toolpath", "set-ups")]
+    for number, piece in enumerate(found, start=1):
+        runner.progress("set-ups", (number - 1) / len(found), f"planning {number} of {len(found)}")
+        own, part = StageRunner(runner.progress), job_part(job, mesh, toolpath, piece, machine=task.machine)
+        own.stages += [*before, Stage("toolpath", 0.0, (part, piece), f"set-up {number} of {len(found)}: {piece}")]
+        folder = staging / SetUp.folder_of(number)
+        folder.mkdir()
+        specification = dataclasses.replace(task.specification, toolpath=part, missed=missed)
+        own_task = dataclasses.replace(task, specification=specification, runner=own, piece=piece)
+        parts.append(SetUp(number, piece, _planned(own_task, folder, writers)))
+    done = SetUps(tuple(parts), cutting, missed, job.placement.setups)
+    runner.stages.append(Stage("set-ups planned", sum(part.seconds for part in parts), done, str(done)))
+    return _written(task, done.verdict, staging, writers)
