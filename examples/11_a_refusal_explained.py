@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from pentapod import Component, Machine, Refusal, Toolpath, plan
-from pentapod.cli.commands.explain import shortfalls_text
+from pentapod.cli.limits_text import shortfalls_text
 from pentapod.toolpath import Segment, SegmentKind
 
 LENGTH, WIDTH, RADIUS, TILT = 0.62, 0.44, 1.2, np.radians(15.0)

@@ -24,18 +24,24 @@ def test_packages_export_what_they_say_and_document_it() -> None:
                 assert value.__doc__, f"{name}.{exported}"
 
 
-def test_the_imports_for_type_checkers_are_the_names_that_load() -> None:
-    tree = ast.parse(Path(pentapod.__file__).read_text(encoding="utf-8"))
+@pytest.mark.parametrize(
+    "room", ["pentapod", *(f"pentapod.{name}" for name in ("job", "kinematics", "machine", "toolpath"))]
+)
+def test_the_imports_for_type_checkers_are_the_names_that_load(room: str) -> None:
+    package = importlib.import_module(room)
+    tree = ast.parse(Path(str(package.__file__)).read_text(encoding="utf-8"))
     guard = next(node for node in tree.body if isinstance(node, ast.If))
     typed = {}
     for node in guard.body:
         assert isinstance(node, ast.ImportFrom)
         typed |= {alias.asname: node.module for alias in node.names}
-    assert sorted(typed) == sorted(pentapod.__all__)
+    assert sorted(typed) == sorted(package.__all__)
+    inner = {entry.name for entry in pkgutil.iter_modules(package.__path__)} if room != "pentapod" else set()
+    assert inner.isdisjoint(typed), "a module hides the name once it is loaded"
     for name, home in typed.items():
-        value = getattr(pentapod, name)
+        value = getattr(package, name)
         assert value is getattr(importlib.import_module(home), name) or name == "verify", name
-    assert set(pentapod.__all__) <= set(dir(pentapod))
+    assert set(package.__all__) <= set(dir(package))
 
 
 def test_unknown_names_are_attribute_errors() -> None:

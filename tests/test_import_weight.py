@@ -3,6 +3,8 @@
 import json
 import subprocess
 import sys
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -46,3 +48,17 @@ def test_every_name_loads_without_the_solvers() -> None:
 
 def test_the_check_can_fail() -> None:
     assert loaded_after("import rich", HEAVY) == ["rich"]
+
+
+def test_a_part_that_cannot_fit_is_refused_before_the_solvers_are_loaded(make_job: Callable[..., Path]) -> None:
+    path = make_job(('unit = "mm"', 'unit = "inch"'))
+    code = f"from pentapod.cli.main import run\nassert run(['plan', {str(path)!r}, '-o', {str(path.parent)!r}]) == 2"
+    ours = tuple(f"pentapod.{name}" for name in ("planning", "timing", "verify", "simulate", "report"))
+    libraries = ("casadi", "numba", "rich", "toppra", "scipy.optimize", "scipy.ndimage", "scipy.interpolate")
+    assert loaded_after(code, (*ours, *libraries, "pentapod.machine.identification")) == []
+
+
+def test_a_mistyped_key_is_told_before_machine_and_mesh_are_loaded(make_job: Callable[..., Path]) -> None:
+    path = make_job(("cut_mm_min", "cut_mm_mim"))
+    code = f"from pentapod.cli.main import run\nassert run(['plan', {str(path)!r}]) == 2"
+    assert loaded_after(code, ("pentapod.machine.machine", "pentapod.planning", "pentapod.job.pipeline")) == []

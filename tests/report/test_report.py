@@ -24,6 +24,7 @@ from pentapod.planning import PlacedPath
 from pentapod.program import Program
 from pentapod.report import write_report
 from pentapod.report.decimate import keep_extremes, thinned_mesh
+from pentapod.report.figure import leg_colour, leg_dash
 from pentapod.report.signals import Signals
 from pentapod.report.words import duration, number, opening, placement_sentences
 from pentapod.timing import Trajectory
@@ -376,3 +377,8 @@ def test_viewer_draws_few_waypoints_of_a_long_job():
     assert unpacked(by_feed["line"]["color"]).max() == pytest.approx(20.0 * speeds.max(), rel=1e-6)
     assert set(unpacked(by_cause["line"]["color"])) == set(range(7))
     assert [trace.get("visible", True) for trace in traces] == [True, False, False, "legendonly"]
+
+
+def test_six_legs_are_told_apart_by_colour_and_dash():
+    assert len({leg_colour(leg) for leg in range(6)}) == 6
+    assert len({leg_dash(leg) for leg in range(6)}) == 6

@@ -233,3 +233,12 @@ def test_report_prints_on_a4(chromium, report, tmp_path):
         (Path(shots) / "report.pdf").write_bytes(pdf)
         opened.page.screenshot(path=Path(shots) / "report-paper.png", full_page=True)
     opened.page.close()
+
+
+def test_a_telephone_shows_the_report_without_scrolling_sideways(chromium, report):
+    narrow = chromium.new_page(viewport={"width": 390, "height": 844})
+    narrow.set_default_timeout(PATIENCE_MS)
+    narrow.goto(report[0].as_uri())
+    narrow.wait_for_function("document.getElementById('readout').textContent !== ''")
+    assert narrow.evaluate("document.documentElement.scrollWidth") <= 390
+    narrow.close()

@@ -1,9 +1,12 @@
-"""Registry: plug-ins by name, pentapod's own and those of other packages, found by entry points."""
+"""Registry: plug-ins by name, pentapod's own and those of other packages, found by entry points; names of packages.
+
+Both are imported when they are first used.
+"""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -112,3 +115,23 @@ class Registry(Mapping[str, T], Generic[T]):
             f"the entry point names no {self.kind}", key=entry.name, value=entry.value,
             expected=f"a pentapod {self._type.__name__}", remedy=f"repair or remove {package}",
         )  # fmt: skip
+
+
+def imported_when_used(
+    package: str, homes: Mapping[str, str]
+) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """Return `__getattr__`, `__dir__` and `__all__` of a package whose names are imported when they are first used.
+
+    homes: names, separated by spaces, by the module that they live in, below `pentapod`. No name may be that of a
+    module of the package, which would hide it.
+    """
+    places = {name: f"pentapod.{home}" for home, names in homes.items() for name in names.split()}
+
+    def get(name: str) -> Any:
+        if name not in places:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        value = getattr(import_module(places[name]), name)
+        setattr(sys.modules[package], name, value)
+        return value
+
+    return get, lambda: sorted({*vars(sys.modules[package]), *places}), sorted(places)

@@ -23,6 +23,7 @@ VERBS = {
     "fk": "pentapod.cli.commands.kinematics:fk",
     "modes": "pentapod.cli.commands.modes:modes",
     "new": "pentapod.cli.commands.new:new",
+    "warm-up": "pentapod.cli.commands.warm_up:warm_up",
 }
 """In the order of `pentapod --help`: name → module:command."""
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.numerics.bernstein import multiply, split
+from pentapod.numerics.blocks import blocks
 
 Interpolation = Literal["linear", "cubic"]
 """How a controller moves between setpoints."""
@@ -74,19 +75,10 @@ class Interpolant:
     @cached_property
     def rates(self) -> Floats:
         """Largest |rate| (N − 1, d) on each interval, per second."""
-        d = self._steps / self.period
-        speed = np.abs(d[..., [0, -1]]).max(axis=-1)
-        if self.degree == 3:
-            # Only a rate whose middle coefficient is beyond both ends can have its maximum in between.
-            inner = np.abs(d[..., 1]) > speed
-            a, b, c = (d[..., k][inner] for k in range(3))
-            bend = a - 2.0 * b + c
-            with np.errstate(divide="ignore", invalid="ignore"):
-                t = (a - b) / bend
-            t = np.where((t > 0.0) & (t < 1.0), t, 0.0)
-            vertex = (1 - t) ** 2 * a + 2 * t * (1 - t) * b + t * t * c
-            speed[inner] = np.maximum(speed[inner], np.abs(vertex))
-        return speed
+        found = np.empty(self.bernstein.shape[:2])
+        for block in blocks(len(found)):
+            found[block] = _largest_rates(self._steps[block] / self.period)
+        return found
 
     @cached_property
     def first(self) -> Floats:
@@ -153,14 +145,33 @@ class Interpolant:
         return self.degree * np.diff(self.bernstein, axis=-1)
 
 
+def _largest_rates(d: Floats) -> Floats:
+    """Return the largest |rate| (n, d) of polynomials with rates of these coefficients (n, d, 1 or 3)."""
+    speed = np.maximum(np.abs(d[..., 0]), np.abs(d[..., -1]))
+    if d.shape[-1] == 3:
+        # Only a rate whose middle coefficient is beyond both ends can have its maximum in between.
+        inner = np.abs(d[..., 1]) > speed
+        a, b, c = (d[..., k][inner] for k in range(3))
+        bend = a - 2.0 * b + c
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = (a - b) / bend
+        t = np.where((t > 0.0) & (t < 1.0), t, 0.0)
+        vertex = (1 - t) ** 2 * a + 2 * t * (1 - t) * b + t * t * c
+        speed[inner] = np.maximum(speed[inner], np.abs(vertex))
+    return speed
+
+
 def largest_length(vectors: Floats) -> tuple[float, int]:
     """Return the maximum of |v(t)| over M vectors of polynomials, t in [0, 1], and the index of its vector.
 
     vectors (M, d, n + 1): Bernstein coefficients. Branch and bound on |v|²: its coefficients enclose it, and its end
     coefficients are values.
     """
-    square = multiply(vectors, vectors).sum(axis=1)
-    owners = np.arange(len(square))
+    # No coefficient of |v|² is larger than that of the longest coefficient of v: most vectors are out at once.
+    lengths = np.square(vectors).sum(axis=1)
+    likely = lengths[:, [0, -1]].max(initial=0.0) * (1.0 - RELATIVE_ERROR)
+    owners = np.flatnonzero(~(lengths.max(axis=1) < likely))
+    square = multiply(vectors[owners], vectors[owners]).sum(axis=1)
     best, where = 0.0, 0
     for _ in range(BISECTION_ROUNDS):
         ends = np.maximum(square[:, 0], square[:, -1])

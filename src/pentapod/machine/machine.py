@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,11 +21,13 @@ from pentapod.kinematics.robot import Robot
 from pentapod.machine import reader
 from pentapod.machine.bars import Bars, PassiveLimb
 from pentapod.machine.calibration.digest import digest_of
-from pentapod.machine.calibration.record import CalibrationRecord
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.fields import for_legs, positive
 from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
+
+if TYPE_CHECKING:
+    from pentapod.machine.calibration.record import CalibrationRecord
 
 ARCHITECTURAL_LIMIT = 0.005
 """Least `conditioning` of a machine's robot: below it, some motion hardly changes the leg lengths."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ValidationError
@@ -21,13 +21,14 @@ from pentapod.base.toml import line_of, parsed, read_toml
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.kinematics.robot import Robot
-from pentapod.machine.calibration.calibration_file import read_calibration
-from pentapod.machine.calibration.record import CalibrationRecord
 from pentapod.machine.drives import Drives, Masses
 from pentapod.machine.families import FAMILIES, legs_of
 from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
 from pentapod.machine.tables import FILE_KEYS, GuideKeys, MachineTables, MachineToolKeys, PlatformJointKeys
+
+if TYPE_CHECKING:
+    from pentapod.machine.calibration.record import CalibrationRecord
 
 Made = TypeVar("Made")
 
@@ -152,6 +153,8 @@ def _as_built(
             "a machine with guides has no calibration file", key="calibration.file", value=name,
             expected="a geometry that does not change", remedy="describe the machine with its guides where they stand",
         )  # fmt: skip
+    from pentapod.machine.calibration.calibration_file import read_calibration  # noqa: PLC0415  few machines have one
+
     path = Path(machine_file).parent / name
     record = read_calibration(path)
     try:

@@ -10,7 +10,7 @@ import numpy as np
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.collision_world import NOTHING
-from pentapod.numerics.one_thread import on_one_thread
+from pentapod.numerics.threads import on_one_thread
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.common_axes import OPTIONS as COMMON_AXES
 from pentapod.planning.placement.common_axes import directions

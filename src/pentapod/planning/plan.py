@@ -12,7 +12,7 @@ from pentapod.base.refusal import Refusal
 from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.machine import Machine
-from pentapod.numerics.one_thread import on_one_thread
+from pentapod.numerics.threads import on_one_thread
 from pentapod.planning.diagnosis import refusal
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.placement.base_reconfiguration import reconfigured

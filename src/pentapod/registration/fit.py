@@ -8,7 +8,6 @@ surface that the mesh approximates: the facets of a sphere would seem to tell it
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -105,8 +104,7 @@ def register(
             "too few touches", key="touches", value=len(centres), expected=f"at least {OPTIONS.least}: six unknowns",
         )  # fmt: skip
     task = _Task(surface, centres, radius)
-    found = [task.fitted(start)]
-    found += [task.fitted(other) for other in task.starts(start)]
+    found = [task.fitted(one) for one in (start, *task.starts(start))]
     best = min(found, key=lambda fitted: fitted.quality)
     good = [f for f in found if f.quality <= OPTIONS.as_good * max(best.quality, noise or OPTIONS.floor)]
     near = [fitted for fitted in good if task.is_near(start, fitted.placement)] or good
@@ -117,11 +115,10 @@ def register(
     )
     result = task.result(nearest, cut, noise)
     if len(result.outliers) > OPTIONS.most_outliers * len(centres):
-        worst = 1e3 * float(np.abs(result.residuals).max())
-        return NotRegistered(
-            "registration", f"no placement fits: {len(result.outliers)} of {len(centres)} touches are off, by up to "
-            f"{worst:.3g} mm", remedy="Check part, tip diameter, probe length and machine of the touches", found=result,
-        )  # fmt: skip
+        worst = f"by up to {1e3 * np.abs(result.residuals).max():.3g} mm"
+        cause = f"no placement fits: {len(result.outliers)} of {len(centres)} touches are off, {worst}"
+        remedy = "Check part, tip diameter, probe length and machine of the touches"
+        return NotRegistered("registration", cause, remedy=remedy, found=result)
     result = replace(result, others=() if result.held else task.others(result, good, start, cut))
     twins = [other for other in result.others if other.near]
     if twins:
@@ -159,23 +156,31 @@ class _Task:
 
     def fitted(self, start: RigidTransform, rows: Bools | None = None) -> _Fitted:
         """Return the fit from a start. rows (N,): touches to use; all where there are none."""
-        best = self._at(start)
+        best = self._descended(self._at(start), rows, loose=False)
+        if len(best.null):  # far from the part's place a motion may seem open that is determined there
+            again = self._descended(best, rows, loose=True)
+            return again if len(again.null) < len(best.null) else best
+        return best
+
+    def _descended(self, best: _Fitted, rows: Bools | None, *, loose: bool) -> _Fitted:
+        """Return the best of Gauss-Newton's steps. loose: along motions that barely change the gaps, too."""
         for kind in ("normals", "gradients"):  # those of the smooth surface lead past the facets' edges
             here, idle = best, 0
             for _ in range(OPTIONS.rounds):
-                here = self._stepped(here, kind, rows)
+                here = self._stepped(here, kind, rows, loose=loose)
                 idle = 0 if here.merit(rows) < (1.0 - OPTIONS.settled) * best.merit(rows) else idle + 1
                 best = min(best, here, key=lambda fitted: fitted.merit(rows))
                 if idle >= OPTIONS.idle:
                     break
         return best
 
-    def _stepped(self, here: _Fitted, kind: Literal["normals", "gradients"], rows: Bools | None) -> _Fitted:
+    def _stepped(self, here: _Fitted, kind: str, rows: Bools | None, *, loose: bool) -> _Fitted:
         """Return the placement after a Gauss-Newton step along the motions that the touches determine."""
         contacts, weights = here.contacts, _weights(here.contacts.gaps, rows)
         jacobian = motion_rows(contacts.points, getattr(contacts, kind), self.middle, self.size)
-        a, b = (jacobian @ here.basis.T) * weights[:, None], contacts.gaps * weights
-        step = np.linalg.lstsq(a, b, rcond=None)[0] @ here.basis
+        basis = np.concatenate([here.basis, here.null]) if loose else here.basis
+        a, b = (jacobian @ basis.T) * weights[:, None], contacts.gaps * weights
+        step = np.linalg.lstsq(a, b, rcond=OPTIONS.undetermined if loose else None)[0] @ basis
         step *= min(1.0, OPTIONS.largest_step * self.size / max(float(np.abs(step).max(initial=0.0)), 1e-300))
         return self._at(self._moved(here.placement, step))
 
@@ -192,8 +197,7 @@ class _Task:
         """Return a placement after a motion of the part by a twist (6,), workpiece frame."""
         turn = Rotation.from_rotvec(twist[3:] / self.size).as_matrix()
         u, _, v = np.linalg.svd(placement.rotation @ turn)
-        centre = placement.apply(self.middle + twist[:3])
-        return RigidTransform(u @ v, centre - u @ v @ self.middle)
+        return RigidTransform(u @ v, placement.apply(self.middle + twist[:3]) - u @ v @ self.middle)
 
     def result(self, fitted: _Fitted, cut: CutSurface, noise: float | None) -> Registration:
         """Return the registration without outliers, from a first fit."""
@@ -265,7 +269,10 @@ class _Task:
         kept: list[RigidTransform] = [found.placement]
         others: list[OtherPlacement] = []
         least = OPTIONS.different * max(found.noise, float(found.across.max(initial=0.0)), OPTIONS.floor)
-        for fit in fits:
+        for first in fits:
+            if any(self._differ(placement, first.placement, cut) <= least for placement in kept):
+                continue
+            fit = self.fitted(first.placement, found.used)  # the first fit may have ended early
             if all(self._differ(placement, fit.placement, cut) > least for placement in kept):
                 kept.append(fit.placement)
                 shift, turn = self.off(found.placement, fit.placement)

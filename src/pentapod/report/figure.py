@@ -16,10 +16,10 @@ from pentapod.report.decimate import keep_extremes
 
 Figure = dict[str, Any]
 
-LEG_COLOURS = ("#2a78d6", "#1baa7a", "#e08a00", "#c2417c", "#7a5cd6")
+LEG_COLOURS = ("#2a78d6", "#1baa7a", "#e08a00", "#c2417c", "#7a5cd6", "#3b9ab2")
 """Colours of the legs, the same in every figure, legible on a light and on a dark background."""
 
-LEG_DASHES = ("solid", "10px 3px", "2px 2px", "8px 2px 2px 2px", "16px 4px")
+LEG_DASHES = ("solid", "10px 3px", "2px 2px", "8px 2px 2px 2px", "16px 4px", "5px 5px")
 """Dashes of the legs, so that lines differ without colour, too."""
 
 LIMIT_COLOUR = "#d2413a"

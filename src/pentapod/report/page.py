@@ -13,10 +13,12 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.build.limits import placement_limits
 from pentapod.job.build.placement import job_at, placement_toml
 from pentapod.job.build.specification import job_collision_world
-from pentapod.job.build.toolpath import job_tool, stem_sentence
+from pentapod.job.build.tool import job_tool
+from pentapod.job.build.toolpath import stem_sentence
 from pentapod.job.outcome import Outcome, SetUps
 from pentapod.job.plan_arrays import matrix_mm
 from pentapod.job.schema.job import Job
+from pentapod.kinematics.mode import Mode
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.leg_ends import arms_beside, leg_ends
 from pentapod.machine.machine import Machine
@@ -73,6 +75,11 @@ def _context(outcome: Outcome) -> dict[str, Any]:
         "setup_sheet": setup_sheet(outcome),
         "chosen_by": "" if placed is None else placed.placement.chosen_by,
         "component": "" if placed is None else str(placed.component),
+        "component_signs": (
+            "signs of the singularity polynomial and of w"
+            if placed is not None and isinstance(placed.component, Mode)
+            else "signs of w and S"
+        ),
         "stages": outcome.stages,
         "program": program,
         "poses_shown": signals is not None,

@@ -19,7 +19,7 @@ from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.artefacts import ARRAYS, PROGRAM
 from pentapod.job.build.specification import job_collision_world
-from pentapod.job.build.toolpath import job_tool
+from pentapod.job.build.tool import job_tool
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.outcome import Outcome, SetUp
 from pentapod.job.plan_arrays import BOX, GUIDES, JOB_FILE, WAYPOINTS, guides_in, piece_in

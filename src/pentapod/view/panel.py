@@ -79,7 +79,7 @@ def place_words(placement: RigidTransform) -> str:
     """Return position and rotation as in a job file."""
     position = ", ".join(f"{round(1e3 * value, 2) + 0.0:.2f}" for value in placement.translation.tolist())
     angles = ", ".join(f"{round(angle, 2) + 0.0:.2f}" for angle in rotation_angles_deg(placement.rotation))
-    return f"position ({position}) mm, rotation ({angles})°".replace("-", "−")
+    return f"position ({position}) mm, rotation ({angles}) deg".replace("-", "−")
 
 
 def machine_pose_words(time: float, machine_pose: MachinePose) -> str:

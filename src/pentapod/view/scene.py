@@ -108,11 +108,14 @@ class ViewerScene:
         machine = self._run.machine
         centre, upward = machine.work.centre, -float(np.sign(machine.work.centre[2]) or 1.0)
         server.scene.set_up_direction((0.0, 0.0, upward))
-        span = float(machine.legs.max_length.max())
+        shown = np.vstack([machine.robot.base_joints, centre])
+        middle = 0.5 * (shown.min(axis=0) + shown.max(axis=0))
+        far = 2.1 * float(np.linalg.norm(shown - middle, axis=1).max())
+        towards = np.array([-0.42, 0.88, -0.2 * upward])
+        right = np.cross(towards, [0.0, 0.0, upward])
         camera = server.initial_camera
-        middle = centre * [1.0, 1.0, 0.7]
-        camera.position = middle + span * np.array([0.35, -0.7, 0.25 * upward])
-        camera.look_at = middle + span * np.array([0.12, 0.0, 0.0])  # the panel covers the right
+        camera.look_at = middle + 0.2 * far * right  # the panel covers the right
+        camera.position = camera.look_at - far * towards
         camera.up = (0.0, 0.0, upward)
 
     def _add_base(self) -> None:

@@ -60,6 +60,11 @@ def test_too_few_poses(seen):
     assert identify(measured("pose", 4, 1), MACHINE, groups=["zeros"]).calibration.identified[0] == "leg 1 zero"
 
 
+def test_one_pose_measured_again_and_again_fixes_no_frame():
+    seen = measured("pose", 20, 1, own_frame=True)
+    assert "m.csv: the positions are on a line" in said(seen.some(np.zeros(20, dtype=int)))
+
+
 def test_reversed_axes_and_another_component():
     seen = measured("pose", 20, 1)
     turned = replace(seen, seen=np.hstack([seen.seen[:, :3], -seen.seen[:, 3:]]))

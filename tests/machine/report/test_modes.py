@@ -109,3 +109,27 @@ def test_modes_of_a_calibrated_machine_are_proven_complete() -> None:
     assert [str(pose.branch) for pose in found.poses] == ["++", "+-", "-+", "--"]
     (true,) = found.admissible
     np.testing.assert_allclose(true.tip, DESK.work.centre, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["spr", "prpu"])
+def test_modes_of_a_machine_with_passive_joints_are_searched_for(name: str) -> None:
+    machine, rng = Machine.load(name), np.random.default_rng(3)
+    robot, several = machine.robot, 0
+    for _ in range(12):
+        i = rng.normal(size=3) * 0.6 + [0.0, 0.0, 1.0]
+        i /= np.linalg.norm(i)
+        p = robot.home + rng.uniform(-0.25, 0.25, 3)
+        found = admissible_modes(machine, robot.leg_lengths(p, i))
+        if isinstance(found, Refusal):
+            assert "singularity" in found.cause
+            continue
+        assert not found.complete
+        tip = p + machine.tool_length * i
+        assert min(np.linalg.norm(pose.tip - tip) for pose in found.poses) < 1e-6
+        several += len(found.poses) > 1
+    assert several >= 6
+    home = np.array([0.0, 0.0, 1.0])
+    first = admissible_modes(machine, robot.leg_lengths(robot.home, home)).poses[0]
+    assert first.fits
+    np.testing.assert_allclose(first.axis, -home, atol=1e-9)
+    assert isinstance(admissible_modes(machine, [0.1, 0.9, 0.1, 0.9, 0.1]), Refusal)  # no pose has such legs

@@ -1,5 +1,7 @@
 """PlacementConstraints: what is allowed stays allowed, and what the solvers find keeps table, box, turn and fixture."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -95,6 +97,14 @@ def test_a_half_turn_is_measured_and_undone():
     table = PlacementConstraints.table(0.5, up=(0.0, 0.0, 1.0))
     r, _ = table.nearest(np.eye(3)[None], np.zeros((1, 3)))
     np.testing.assert_allclose(r[0] @ [0.0, 0.0, 1.0], [0.0, 0.0, -1.0], atol=1e-12)
+
+
+def test_a_part_on_a_table_of_any_height_keeps_its_upper_side() -> None:
+    wide = np.full(3, np.inf)
+    table = replace(PlacementConstraints.table(0.5, up=(0.0, 1.0, 0.0)), low=-wide, high=wide)
+    assert table.is_bounded
+    turned = RigidTransform(Rotation.random(rng=0).as_matrix(), np.zeros(3))
+    np.testing.assert_allclose(table.nearest_to(turned).rotate(np.array([0.0, 1.0, 0.0])), [0.0, 0.0, -1.0], atol=1e-12)
 
 
 def test_impossible_freedoms_are_errors():

@@ -9,8 +9,9 @@ import trimesh
 
 from pentapod import Mesh, RasterOptions, Region
 from pentapod.cutters.ball import BallCutter
+from pentapod.geometry.directions import angle_between
 from pentapod.mesh.passes import Passes
-from pentapod.toolpath import SegmentKind, make_toolpath
+from pentapod.toolpath import PencilOptions, SegmentKind, make_toolpath
 from pentapod.toolpath.strategies.raster import raster_paths
 from pentapod.toolpath.surfaces.ball_centres import DriveOptions, smoothed
 from pentapod.toolpath.surfaces.drive_surface import DriveSurface
@@ -208,3 +209,27 @@ def test_a_pass_is_not_closed_where_both_ends_touch_one_corner_of_the_part():
     upright = np.tile(UP, (4, 1))
     turned = np.concatenate([upright[:-1], [[0.6, 0.0, 0.8]]])
     assert Passes.of([(contacts, upright), (contacts, turned)]).closed.tolist() == [True, False]
+
+
+def valley(count, seed):
+    """A strip with a valley of 50° flanks along x, whose facets are uneven."""
+    random = np.random.default_rng(seed)
+    x = np.concatenate([[-20.0], np.sort(random.uniform(-19.5, 19.5, count)), [20.0]])
+    y = np.array([-10.0, -6.0, -1.7, 0.0, 0.9, 4.0, 10.0])
+    i, j = np.meshgrid(np.arange(len(x) - 1), np.arange(len(y) - 1), indexing="ij")
+    a, b = (i * len(y) + j).ravel(), ((i + 1) * len(y) + j).ravel()
+    points = np.stack([np.repeat(x, len(y)), np.tile(y, len(x)), np.tile(np.abs(y), len(x))], axis=1)
+    return Mesh.of(1e-3 * points, np.concatenate([np.stack([a, b, b + 1], 1), np.stack([a, b + 1, a + 1], 1)]))
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.35])
+def test_axes_along_a_corner_are_midway_between_its_walls(lean):
+    """A straight valley turned about its own line: its axis does not change along it."""
+    mesh = valley(count=14, seed=2)
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, np.cos(lean), -np.sin(lean)], [0.0, np.sin(lean), np.cos(lean)]])
+    mesh = Mesh.of(mesh.vertices @ turn.T, mesh.faces)
+    toolpath = make_toolpath(mesh, BallCutter(R), PencilOptions())
+    axes = np.concatenate([s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT])
+    assert len(axes) > 10
+    away = angle_between(axes, turn @ UP)
+    assert np.degrees(away).max() < 0.5

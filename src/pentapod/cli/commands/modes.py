@@ -58,7 +58,8 @@ def modes(legs: str, rails: str | None, error_mm: float, machine_name: str, as_j
             tip, axis = (
                 ", ".join(f"{x:{form}}" for x in v) for v, form in ((1e3 * pose.tip, ".3f"), (pose.axis, "+.4f"))
             )
-            verdict = "fits" if pose.fits else _words(pose.excluded)
+            verdict = "fits" if pose.located else "not excluded, as it is close to a singularity"
+            verdict = _words(pose.excluded) if pose.excluded else verdict
             click.echo(f"  {pose.branch}  tip ({tip}) mm, tool axis ({axis}): {verdict}")
     if fitting != 1 and not quiet:
         told = "look at the machine to tell them apart" if fitting else "readings, machine file or their order is wrong"

@@ -21,13 +21,16 @@ if TYPE_CHECKING:
 @click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True,
               help="Folder for the files.")  # fmt: skip
 @click.option("--explain", is_flag=True, help="Print the nearest limits: where, and by how much.")
-@click.option("--advice", type=click.IntRange(0), default=1, show_default=True, metavar="N",
-              help="Changes to find with which a job that cannot be done is planned; 0: do not search.")  # fmt: skip
+@click.option("--advice", type=click.IntRange(0), metavar="N",
+              help="Changes to find with which a job that cannot be done is planned; 0: do not search. "
+                   "1 when left out, but 0 where the error says which unit the part must have.")  # fmt: skip
 @click.option("--placement", type=click.Path(path_type=Path), metavar="FILE",
               help="Fix the part where `pentapod register` found it; writes placed-job.toml, too.")  # fmt: skip
 @json_option
 @quiet_option
-def plan(job: Path, out: Path, explain: bool, advice: int, placement: Path | None, as_json: bool, quiet: bool) -> int:
+def plan(
+    job: Path, out: Path, explain: bool, advice: int | None, placement: Path | None, as_json: bool, quiet: bool
+) -> int:
     """Plan JOB.toml: write program.csv, verdict.json, report.html and plan.npz.
 
     The folder changes only when the run ends, so that its files are always of one run. A job that cannot be done leaves
@@ -39,22 +42,25 @@ def plan(job: Path, out: Path, explain: bool, advice: int, placement: Path | Non
     search for changes it ends that. At any other time it ends the command and changes nothing.
     """
     from pentapod.base.errors import InputError
-    from pentapod.job.advice.options import AdviceOptions
-    from pentapod.job.advise import can_help
-    from pentapod.job.artefacts import REPORT
-    from pentapod.job.clamped.placed_job import placed_job, read_placement
-    from pentapod.job.pipeline import run
     from pentapod.job.schema.job import Job
-    from pentapod.report import write_report
 
-    loaded, options = Job.load(job), AdviceOptions(wanted=advice) if advice else None
+    loaded = Job.load(job)
+
+    from pentapod.job.advice.options import AdviceOptions
+    from pentapod.job.advice_on_errors import can_help
+    from pentapod.job.artefacts import REPORT
+    from pentapod.job.pipeline import run
+
+    options = None if advice == 0 else AdviceOptions(wanted=advice or 1)
     if placement is not None:
+        from pentapod.job.clamped.placed_job import placed_job, read_placement
+
         loaded = placed_job(loaded, read_placement(placement), out)
     try:
         with progress_bar(quiet=quiet or as_json) as progress:
-            outcome = run(loaded, out, progress, writers={REPORT: write_report}, advice=options)
+            outcome = run(loaded, out, progress, writers={REPORT: _write_report}, advice=options)
     except InputError as error:
-        if options is None or not can_help(error):
+        if options is None or not can_help(error) or (advice is None and error.key == "part.unit"):
             raise
         click.echo(f"error: {error}", err=True)  # at once: the search takes as long as a plan or two
         return _advised(loaded, options, as_json=as_json, quiet=quiet)
@@ -95,11 +101,17 @@ def shown(outcome: Outcome, out: Path, *, explain: bool, as_json: bool, quiet: b
     return 0 if outcome.passed else 1
 
 
+def _write_report(outcome: Outcome, file: Path) -> None:
+    from pentapod.report import write_report
+
+    write_report(outcome, file)
+
+
 def _advised(job: Job, options: AdviceOptions, *, as_json: bool, quiet: bool) -> int:
     """Search for advice for a job that is an error, print it, and return the exit code of the error."""
     from pentapod.base.errors import InputError
     from pentapod.cli.main import EXIT_INPUT
-    from pentapod.job.advise import advise
+    from pentapod.job.advice_on_errors import advise
 
     try:
         with progress_bar(quiet=quiet or as_json) as progress:
@@ -115,7 +127,7 @@ def _advised(job: Job, options: AdviceOptions, *, as_json: bool, quiet: bool) ->
 
 def _explained(outcome: Outcome) -> str:
     """Return the table of limits of a run: of its refusal, or of its plan."""
-    from pentapod.cli.commands.explain import limits_text, shortfalls_text
+    from pentapod.cli.limits_text import limits_text, shortfalls_text
     from pentapod.job.outcome import SetUps
     from pentapod.planning import PlacedPath
     from pentapod.planning.diagnosis import active_limits

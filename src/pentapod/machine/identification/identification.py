@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -91,7 +92,8 @@ def identify(
     try:
         return _identified(measured, machine, design, groups, file, options, keep_outliers=keep_outliers)
     except ArrayError as error:
-        name_better_reading(measured, design, file)
+        with suppress(ArrayError):  # poses in which no other reading can be tried
+            name_better_reading(measured, design, file)
         raise MachineError(
             error.what, file=file, key=error.key, value=error.value, expected=error.expected, remedy=error.remedy
         ) from error

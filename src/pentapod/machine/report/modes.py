@@ -17,6 +17,7 @@ from pentapod.kinematics.all_modes.all_modes import all_poses
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.kinematics.legs_on_rings import LegsOnRings
 from pentapod.kinematics.mode import Mode
+from pentapod.kinematics.platforms.constrained import ConstrainedPlatform
 from pentapod.kinematics.robot import Branch, Robot
 from pentapod.machine.clearance.leg_clearance import clearances, pair_names
 from pentapod.machine.machine import Machine
@@ -26,8 +27,9 @@ from pentapod.machine.machine import Machine
 class AssemblyPose(Value):
     """One pose that the legs allow. tip (3,) metres, axis (3,) tip → spindle, machine frame.
 
-    error: by how much the tip can be elsewhere, metres, proven for the error of the legs. excluded: the limits of the
-    machine that the pose breaks for certain, in words; none where it fits.
+    error: by how much the tip can be elsewhere, metres, proven for the error of the legs; infinite close to a
+    singularity, where nothing excludes the pose. excluded: the limits of the machine that the pose breaks for certain,
+    in words; none where it fits.
     """
 
     branch: Branch
@@ -38,6 +40,11 @@ class AssemblyPose(Value):
 
     def __post_init__(self) -> None:
         set_frozen(self, tip=frozen(self.tip, "tip", (3,)), axis=frozen(self.axis, "axis", (3,)))
+
+    @property
+    def located(self) -> bool:
+        """Whether it is proven how far away the pose can be."""
+        return bool(np.isfinite(self.error))
 
     @property
     def fits(self) -> bool:
@@ -70,8 +77,9 @@ def admissible_modes(machine: Machine, legs: ArrayLike, *, leg_error: float = 1e
     lengths without a pose, or close to a singularity, where two modes meet. With base joints in a plane there are no
     other poses (lemma 1 of docs/proofs.md); for a machine as built all are searched (lemma 17), and where that proves
     nothing the poses are those that continue the nominal ones. Where legs end beside the line, the platform counts as
-    turned about it by the machine's law, as every program leaves it; where passive joints turn it, the pose is the one
-    that continues the machine's home, and others are not looked for. Raises InputError.
+    turned about it by the machine's law, as every program leaves it; where passive joints turn it, the poses are
+    those that a search from many starts finds, that of the machine's home first; others close to a singularity count
+    as admissible. Raises InputError.
     """
     robot, count = machine.robot, machine.robot.n_legs
     readings = as_floats(legs, "legs")
@@ -90,8 +98,9 @@ def admissible_modes(machine: Machine, legs: ArrayLike, *, leg_error: float = 1e
     moved, turned = robot.enclose((position, direction), hull, points)
     if robot.arms.any():
         moved[:, :count] = robot.enclose_joints((position, direction), hull)
-    if not np.isfinite(moved).all():
-        near = [str(branch) for branch, by in zip(branches, moved, strict=True) if not np.isfinite(by).all()]
+    known: Bools = np.asarray(np.isfinite(moved).all(axis=1), dtype=np.bool_)
+    if not (known[0] if isinstance(robot, ConstrainedPlatform) else known.all()):
+        near = [str(branch) for branch, sure in zip(branches, known, strict=True) if not sure]
         return Refusal(
             "modes",
             f"close to a singularity in {', '.join(near)}: modes meet within {1e3 * leg_error:g} mm of the legs",
@@ -121,6 +130,10 @@ def _all_modes(robot: Robot, legs: Floats, leg_error: float) -> tuple[tuple[Bran
             order = sorted(range(len(signs)), key=lambda k: branches.index(labels[k]) if labels[k] in branches else 4)
             labels = tuple(labels[k] for k in order)
             return labels, found.position[order], found.direction[order], True
+    if isinstance(robot, ConstrainedPlatform):
+        position, direction = robot.all_poses(legs)
+        signs = robot.branch(position, direction).tolist()
+        return tuple(Mode(*pair) for pair in signs), position, direction, False
     all_legs = np.broadcast_to(legs, (len(branches), robot.n_legs))
     position, direction = robot.pose(all_legs, np.array(branches, dtype=np.float64))
     known: Bools = np.asarray(np.isfinite(position).all(axis=1), dtype=np.bool_)

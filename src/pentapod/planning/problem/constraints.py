@@ -110,7 +110,7 @@ class PlacementConstraints(Value):
     @property
     def is_bounded(self) -> bool:
         """Whether anything limits the placements that the motion leads to."""
-        return self.turn_is_bounded or bool(np.isfinite([self.low, self.high]).any())
+        return self.turn_is_bounded or bool(self.upright.any() or np.isfinite([self.low, self.high]).any())
 
     @property
     def turn_is_bounded(self) -> bool:
