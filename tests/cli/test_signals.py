@@ -62,6 +62,29 @@ def test_signals_during_planning_end_the_command(number, tmp_path):
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["notes.txt"]
 
 
+@pytest.mark.parametrize("number", SIGNALS)
+def test_signals_that_a_library_drops_are_raised_again(number):
+    code = f"""
+import contextlib, signal
+from pentapod.cli.output import progress_bar
+from pentapod.cli.signals import signals_as_exceptions
+with signals_as_exceptions(), progress_bar(quiet=True) as progress:
+    progress("before", 0.0)
+    with contextlib.suppress(BaseException):
+        signal.raise_signal({int(number)})
+    try:
+        progress("after", 0.0)
+    except BaseException as error:
+        print(type(error).__name__)
+    progress("placement", 1.0, "interrupted: the best so far is kept")
+    progress("after", 1.0)
+print("end")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["KeyboardInterrupt" if number == signal.SIGINT else "Terminated", "end"]
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_signals_that_the_parent_ignores_stay_ignored(tmp_path):
     command = [sys.executable, "-c", f"import signal; signal.raise_signal(signal.SIGTERM); {MAIN}", "--version"]
     ignoring = lambda: signal.signal(signal.SIGTERM, signal.SIG_IGN)  # noqa: E731

@@ -54,9 +54,10 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
     Messages of the log `pentapod` (kernels are compiled) are printed above the bars.
     """
     from pentapod.base.progress import silent
+    from pentapod.cli.signals import raising_again
 
     if quiet or not sys.stderr.isatty():
-        yield silent
+        yield raising_again(silent)
         return
     from rich.console import Console
     from rich.logging import RichHandler
@@ -89,7 +90,7 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
         log.addHandler(handler)
         log.setLevel(logging.INFO)
         try:
-            yield show
+            yield raising_again(show)
         finally:
             log.removeHandler(handler)
             log.setLevel(level)

@@ -7,9 +7,16 @@ import threading
 from collections.abc import Generator
 from contextlib import contextmanager
 from types import FrameType
+from typing import TYPE_CHECKING, NoReturn
+
+if TYPE_CHECKING:
+    from pentapod.base.progress import Progress
 
 RETRY_S = 0.05
 """Seconds after which a signal that came during an import is raised again."""
+
+_unanswered: list[int] = []
+"""Signals that were raised and that no search has told of."""
 
 
 class Terminated(SystemExit):
@@ -31,6 +38,24 @@ def signals_as_exceptions() -> Generator[None]:
     finally:
         for number in handled:
             signal.signal(number, signal.SIG_DFL)
+        _unanswered.clear()
+
+
+def raising_again(progress: Progress) -> Progress:
+    """Return a progress that raises a signal once more that came before and was lost.
+
+    Libraries drop exceptions that reach them in a callback or under a bare `except`. A search that ends with its best
+    result so far tells so, in a note that begins with "interrupted"; that signal is answered.
+    """
+
+    def shown(stage: str, fraction: float, note: str = "") -> None:
+        progress(stage, fraction, note)
+        if note.startswith("interrupted"):
+            _unanswered.clear()
+        elif _unanswered:
+            _end_by(_unanswered[-1])
+
+    return shown
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
@@ -38,10 +63,15 @@ def _raise(number: int, frame: FrameType | None) -> None:
         later = threading.Timer(RETRY_S, signal.raise_signal, (number,))
         later.daemon = True
         later.start()
-    elif number == signal.SIGINT:
-        raise KeyboardInterrupt
     else:
-        raise Terminated(128 + number)
+        _unanswered.append(number)
+        _end_by(number)
+
+
+def _end_by(number: int) -> NoReturn:
+    if number == signal.SIGINT:
+        raise KeyboardInterrupt
+    raise Terminated(128 + number)
 
 
 def _is_loading(frame: FrameType | None) -> bool:
