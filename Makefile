@@ -51,8 +51,8 @@ lint: $(READY)
 mutation: $(READY)  ## do the tests of the verdict notice changes of it?
 	$(BIN)/python benchmarks/mutation.py
 
-bench: $(READY)  ## stage times, and kinematics against Newton
-	$(BIN)/python benchmarks/pipeline.py
+bench: $(READY)  ## stage times of whole jobs against the last release (AGAINST=revision), kinematics against Newton
+	$(BIN)/python benchmarks/pipeline.py $(if $(AGAINST),--against $(AGAINST))
 
 bench-kinematics: $(READY)  ## kinematics and proofs against copying arrays and against Newton
 	$(BIN)/python benchmarks/kinematics.py

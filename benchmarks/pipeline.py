@@ -1,17 +1,24 @@
-"""Stage times of whole jobs: the demo, and one of 50,000 waypoints. Run ``make bench``.
+"""Stage times of whole jobs against the last release, in pairs. Run ``make bench``.
 
-Each job runs in a process of its own, so that its peak memory is its own. The table of the kinematics, with the
-Newton solver as its rival, follows.
+    python benchmarks/pipeline.py [--against REVISION] [--pairs N]
+
+Each job runs in a process of its own, so that its peak memory is its own; the two versions take turns, so that a
+machine whose speed drifts is fair to both. REVISION is a tag, branch or commit of git: the newest tag when left out;
+where there is none, this version is measured alone. The table of the kinematics, with the Newton solver as its rival,
+follows.
 """
 
 # ruff: noqa: PLC0415 - the parent process stays light, so that a child's memory is its own
 
 from __future__ import annotations
 
+import argparse
 import json
+import os
 import platform
 import re
 import resource
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -22,6 +29,8 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 DEMO = ROOT / "toolpaths" / "dome.toml"
 WAYPOINTS = 50_000
+SHIPPED = ("seam", "text", "dome", "wavy")
+"""Jobs of `toolpaths/`: a short line, letters on a dome, the demo, a free form."""
 
 
 def large_job(folder: Path) -> Path:
@@ -37,11 +46,13 @@ def large_job(folder: Path) -> Path:
 
 
 def measure(job: Path, folder: Path) -> dict[str, Any]:
-    """Run one job in this process; return its stage times, counts and peak memory."""
+    """Run one job in this process; return its stage times, counts, processor seconds and peak memory."""
     import time
 
+    start = time.perf_counter()
     from pentapod import Job, Program, Toolpath, run, write_report
 
+    stages = {"imports": time.perf_counter() - start}
     start = time.perf_counter()
     outcome = run(Job.load(job), folder)
     planned = time.perf_counter() - start
@@ -49,37 +60,81 @@ def measure(job: Path, folder: Path) -> dict[str, Any]:
     write_report(outcome, folder / "report.html")
     reported = time.perf_counter() - start
     toolpath, program = outcome.find(Toolpath), outcome.find(Program)
-    stages = {stage.name: stage.seconds for stage in outcome.stages}
-    stages["arrays, verdict"] = planned - sum(stages.values())
-    stages["report"] = reported
+    own = {stage.name: stage.seconds for stage in outcome.stages}
+    stages |= own | {"arrays, verdict": planned - sum(own.values()), "report": reported}
+    used = resource.getrusage(resource.RUSAGE_SELF)
     unit = 1.0 if sys.platform == "darwin" else 1024.0  # what ru_maxrss counts in
     return {
         "stages": stages,
+        "cpu": used.ru_utime + used.ru_stime,
         "waypoints": 0 if toolpath is None else len(toolpath),
         "rows": 0 if program is None else len(program.legs),
+        "cycle": 0.0 if program is None else program.duration,
         "passed": outcome.passed,
-        "peak_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 2**20,
+        "peak_mib": used.ru_maxrss * unit / 2**20,
     }
 
 
-def in_child(job: Path, folder: Path) -> dict[str, Any]:
-    """Return `measure` of a new process."""
+def in_child(job: Path, folder: Path, source: Path) -> dict[str, Any]:
+    """Return `measure` of a new process that uses the version in a folder of sources."""
     command = [sys.executable, __file__, "--measure", str(job), str(folder)]
-    answer = subprocess.run(command, capture_output=True, text=True, check=True)
+    own = {**os.environ, "PYTHONPATH": str(source)}
+    answer = subprocess.run(command, capture_output=True, text=True, check=True, env=own)
     return json.loads(answer.stdout.splitlines()[-1])
 
 
-def show(name: str, result: dict[str, Any]) -> None:
-    """Print the table of one job."""
-    total = sum(result["stages"].values())
+def middle(results: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the last of the results of one job, with the medians of all times."""
+    stages = {
+        name: statistics.median(each["stages"].get(name, 0.0) for each in results) for name in results[-1]["stages"]
+    }
+    return {**results[-1], "stages": stages, "cpu": statistics.median(each["cpu"] for each in results)}
+
+
+def show(name: str, result: dict[str, Any], before: dict[str, Any] | None) -> None:
+    """Print the table of one job, beside that of the version before."""
     verdict = "passed" if result["passed"] else "FAILED"
     print(f"\n{name}: {result['waypoints']:,} waypoints, {result['rows']:,} rows, verdict {verdict}")
-    print(f"  {'stage':<16} {'seconds':>8} {'share':>7} {'waypoints/s':>12}")
-    for stage, seconds in result["stages"].items():
-        rate = f"{result['waypoints'] / seconds:12,.0f}" if seconds > 0 else ""
-        print(f"  {stage:<16} {seconds:8.2f} {seconds / total:7.1%} {rate}")
-    print(f"  {'together':<16} {total:8.2f} {1:7.1%} {result['waypoints'] / total:12,.0f}")
-    print(f"  peak memory {result['peak_mib']:,.0f} MiB")
+    print(f"  {'stage':<18} {'seconds':>8} {'before':>8} {'ratio':>7} {'µs a row':>9}")
+    rows = {**result["stages"], "together": sum(result["stages"].values()), "processor": result["cpu"]}
+    old = {} if before is None else before["stages"]
+    old = old and {**old, "together": sum(old.values()), "processor": before["cpu"] if before else 0.0}
+    for stage, seconds in rows.items():
+        known = stage in old and old[stage] > 0.0
+        pair = f"{old[stage]:8.2f} {seconds / old[stage]:7.2f}" if known else f"{'':>8} {'':>7}"
+        each = f"{seconds / result['rows'] * 1e6:9.1f}" if result["rows"] else ""
+        print(f"  {stage:<18} {seconds:8.2f} {pair} {each}")
+    memory = "" if before is None else f" ({before['peak_mib']:,.0f} before)"
+    cycle = "" if before is None else f" ({before['cycle']:.3f} before)"
+    print(f"  peak memory {result['peak_mib']:,.0f} MiB{memory}, cycle time {result['cycle']:.3f} s{cycle}")
+
+
+def newest_tag() -> str | None:
+    """Return the newest tag of the repository; None where there is none."""
+    command = ["git", "-C", str(ROOT), "describe", "--tags", "--abbrev=0"]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    return answer.stdout.strip() or None if answer.returncode == 0 else None
+
+
+def compare(folder: Path, against: str | None, pairs: int) -> None:
+    """Print the tables of all jobs, each run `pairs` times by this version and by the one before in turn."""
+    sources = {"now": ROOT / "src"}
+    if against is not None:
+        git = ["git", "-C", str(ROOT)]
+        subprocess.run([*git, "worktree", "add", "--quiet", "--detach", str(folder / "before"), against], check=True)
+        sources["before"] = folder / "before" / "src"
+    try:
+        jobs = {f"{name} (toolpaths/{name}.toml)": ROOT / "toolpaths" / f"{name}.toml" for name in SHIPPED}
+        jobs[f"large (the dome with about {WAYPOINTS:,} waypoints)"] = large_job(folder)
+        for name, job in jobs.items():
+            results: dict[str, list[dict[str, Any]]] = {version: [] for version in sources}
+            for number in range(pairs):
+                for known, source in sources.items():
+                    results[known].append(in_child(job, folder / f"{job.stem}-{known}-{number}", source))
+            show(name, middle(results["now"]), middle(results["before"]) if against is not None else None)
+    finally:
+        if against is not None:
+            subprocess.run([*git, "worktree", "remove", "--force", str(folder / "before")], check=True)
 
 
 def main() -> None:
@@ -87,12 +142,14 @@ def main() -> None:
     if sys.argv[1:2] == ["--measure"]:
         print(json.dumps(measure(Path(sys.argv[2]), Path(sys.argv[3]))))
         return
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--against", default=newest_tag(), help="revision of git to compare with")
+    parser.add_argument("--pairs", type=int, default=3, help="runs of each job by each version")
+    given = parser.parse_args()
     packages = ", ".join(f"{name} {version(name)}" for name in ("pentapod", "numpy", "scipy", "casadi", "toppra"))
-    print(f"Python {platform.python_version()}, {platform.machine()}, {packages}")
+    print(f"Python {platform.python_version()}, {platform.machine()}, {packages}; against {given.against or 'nothing'}")
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        show("demo (toolpaths/dome.toml)", in_child(DEMO, folder / "demo"))
-        show(f"large (the dome with about {WAYPOINTS:,} waypoints)", in_child(large_job(folder), folder / "large"))
+        compare(Path(name), given.against, given.pairs)
     print()
     import kinematics  # the script beside this one
 
