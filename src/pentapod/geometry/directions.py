@@ -46,6 +46,11 @@ def partway(start: Floats, end: Floats, share: Floats) -> Floats:
     return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
 
 
+def eased(share: Floats) -> Floats:
+    """Return shares from 0 to 1 (N,) that begin and end at rest, without acceleration: a quintic of those given."""
+    return share**3 * (10.0 - 15.0 * share + 6.0 * share * share)
+
+
 def turned(start: Floats, end: Floats, share: Floats, by: Floats) -> Floats:
     """Return the spherical interpolation (N, 3) at `share` (N,) from unit start (3,) to unit end (3,).
 

@@ -13,7 +13,7 @@ from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import Key, check_fields
 from pentapod.base.values import Value
 from pentapod.cutters.tool import Tool
-from pentapod.geometry.directions import partway
+from pentapod.geometry.directions import eased, partway
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import run_starts
 from pentapod.toolpath.axis.modes import AxisMode, Normal, with_lead_and_tilt
@@ -39,8 +39,8 @@ class Orientation(Value):
         float | None,
         Key(
             "deg",
-            "largest angle by which smoothing may turn an axis; 0 for none; when left out, six times the noise of a "
-            "scan's normals, and 0 for clean surfaces",
+            "largest angle by which smoothing may turn an axis; 0 for none; when left out, twelve times the noise of "
+            "a scan's normals, and 0 for clean surfaces",
             ge=0.0,
             le=45.0,
         ),
@@ -59,10 +59,12 @@ class Orientation(Value):
     def __post_init__(self) -> None:
         check_fields(self, ToolpathError)
 
-    def axes(self, runs: list[tuple[Floats, Floats]]) -> list[Floats]:
+    def axes(self, runs: list[tuple[Floats, Floats]], radius: float = 0.0) -> list[Floats]:
         """Return unit axes (n, 3) for each run of contacts and unit normals (n, 3), in the order and sense of travel.
 
-        Raises ToolpathError if the mode does not determine an axis, or no smoothing keeps the rate.
+        radius: of a ball, metres. Where it lies in a groove its contact and the normal jump from one side to the other;
+        its centre goes on, so axes are smoothed as a function of where the centre is. Raises ToolpathError if the mode
+        does not determine an axis, or no smoothing keeps the rate.
         """
         if not runs:
             return []
@@ -72,8 +74,9 @@ class Orientation(Value):
         if self.lead or self.tilt:
             axes = with_lead_and_tilt(axes, tangents(contacts, starts), self.lead, self.tilt)
         reach, tolerance = REACH_M if self.reach is None else self.reach, self.smoothing
-        tolerance = noise_tolerance(contacts, axes, starts, reach) if tolerance is None else tolerance
-        axes = smoothed(contacts, axes, reach, tolerance)
+        places = contacts + radius * normals
+        tolerance = noise_tolerance(places, axes, starts, reach) if tolerance is None else tolerance
+        axes = smoothed(places, axes, reach, tolerance)
         parts = [axes[a:b] for a, b in pairwise(starts)]
         if self.rate is not None:
             parts = [rate_limited(c, part, self.rate) for (c, _), part in zip(runs, parts, strict=True)]
@@ -83,10 +86,10 @@ class Orientation(Value):
 def oriented(toolpath: Toolpath, tool: Tool, orientation: Orientation) -> Toolpath:
     """Return a toolpath with the axes of an orientation instead of the surface's normals.
 
-    Cuts keep their contacts. On links and rapids the axis turns evenly from the end of one cut to the start of the
-    next; before the first cut and after the last it is constant. The tilt centre keeps its way there if the tool can
-    tilt about it: a ball that is clear stays clear. Other tips move with the ends. Raises
-    ToolpathError as `Orientation.axes`.
+    Cuts keep their contacts. On links and rapids the axis turns from the end of one cut to the start of the next, at
+    rest at both ends; before the first cut and after the last it is constant. The tilt centre keeps its way there if
+    the tool can tilt about it: a ball that is clear stays clear. Other tips move with the ends. Raises ToolpathError as
+    `Orientation.axes`.
     """
     cuts = [k for k, segment in enumerate(toolpath.segments) if segment.kind is SegmentKind.CUT]
     if not cuts:
@@ -95,7 +98,7 @@ def oriented(toolpath: Toolpath, tool: Tool, orientation: Orientation) -> Toolpa
     drop = min(tool.tilt_centre, 0.0)
     chosen = [toolpath.segments[k] for k in cuts]
     runs = [(segment.tips + drop * segment.axes, segment.axes) for segment in chosen]
-    found = orientation.axes(runs)
+    found = orientation.axes(runs, max(tool.tilt_centre, 0.0))
     if all(np.array_equal(new, normals) for new, (_, normals) in zip(found, runs, strict=True)):
         return toolpath
     tips, axes = toolpath.tips.copy(), toolpath.axes.copy()
@@ -126,4 +129,4 @@ def _interpolate(old: Floats, tips: Floats, axes: Floats, known: Bools) -> None:
             path = arc_length(old[a : b + 1])
             share = (path / path[-1])[1:-1] if path[-1] > 0.0 else np.full(b - a - 1, 0.5)
             tips[a + 1 : b] += np.outer(1.0 - share, tips[a] - old[a]) + np.outer(share, tips[b] - old[b])
-            axes[a + 1 : b] = partway(axes[a], axes[b], share)
+            axes[a + 1 : b] = partway(axes[a], axes[b], eased(share))

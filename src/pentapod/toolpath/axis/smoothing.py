@@ -19,25 +19,25 @@ class AxisSmoothingOptions:
     """How axes are averaged.
 
     rounds: of averaging. similar: cosine of the angle between axes up to which they are averaged: sides of a crease are
-    not. neighbours: largest number of axes in a mean; thinned: least distance between them along a pass, as a share of
-    the reach, as is ridge: distance over which axes do not turn by regression alone. bisections: for the shortest
-    moving mean. least_noise: standard deviation of the noise in radians, on either direction across, below which axes
-    are clean; noises: tolerance for noisy ones, as a multiple of it, at most `widest` radians. apart: of the places
-    between which noise is looked for, as a share of the reach. fewest: places from which noise is estimated, at least.
-    finer: axes between two places whose turns are looked at; a median turn below the share `turning` of the noise is
-    that of flat facets. median: of the product of neighbouring fourth differences of normal noise, in variances, with
-    the other sign.
+    not. neighbours: largest number of axes in a mean; thinned: edge of the cubes of which each has one axis in it, as a
+    share of the reach, as is ridge: distance over which axes do not turn by regression alone. bisections: for the
+    shortest moving mean. least_noise: standard deviation of the noise in radians, on either direction across, below
+    which axes are clean; noises: tolerance for noisy ones, as a multiple of it, at most `widest` radians. apart: of the
+    places between which noise is looked for, as a share of the reach. fewest: places from which noise is estimated, at
+    least. finer: axes between two places whose turns are looked at; a median turn below the share `turning` of the
+    noise is that of flat facets. median: of the product of neighbouring fourth differences of normal noise, in
+    variances, with the other sign.
     """
 
     rounds: int = 2
     similar: float = 0.5
-    neighbours: int = 128
-    thinned: float = 0.1
+    neighbours: int = 200
+    thinned: float = 0.15
     ridge: float = 0.1
     bisections: int = 20
     least_noise: float = float(np.radians(0.4))
-    noises: float = 6.0
-    widest: float = float(np.radians(30.0))
+    noises: float = 12.0
+    widest: float = float(np.radians(60.0))
     apart: float = 1.0 / 3.0
     fewest: int = 30
     finer: int = 4
@@ -77,15 +77,16 @@ def smoothed(
     """Return axes (N, 3) smoothed along and across the passes, none turned by more than `tolerance` radians.
 
     points (N, 3): of all passes, metres. Each axis becomes that of a linear function fitted to those within `reach`
-    metres with Gaussian weights (local linear regression, which has no bias at the ends of passes), on its own pass and
-    on passes beside it, whose directions differ by less than 60°. An axis beyond the tolerance is turned back to its
-    limit. So axes at a crease keep to the tolerance, and noise below it vanishes.
+    metres (local linear regression, which has no bias at the ends of passes), on its own pass and on passes beside it,
+    whose directions differ by less than 60°. Weights fall to zero towards both limits, so that no axis of a neighbour
+    comes in or drops out at once. An axis beyond the tolerance is turned back to its limit. So axes at a crease keep to
+    the tolerance, and noise below it vanishes.
     """
     if tolerance <= 0.0 or len(points) < 2:
         return axes
-    weights = _weights(points, axes, reach, options)
     result = axes
     for _ in range(options.rounds):
+        weights = _weights(points, result, reach, options)
         mean = normalised(_fitted(weights, points, result, options.ridge * reach))
         share = np.minimum(1.0, tolerance / np.maximum(angle_between(mean, axes), 1e-300))
         result = partway(axes, mean, share)
@@ -104,21 +105,26 @@ def _fitted(weights: csr_array, points: Floats, axes: Floats, ridge: float) -> F
 
 
 def _weights(points: Floats, axes: Floats, reach: float, options: AxisSmoothingOptions) -> csr_array:
-    """Return the matrix (N, N) of normalised Gaussian weights; a standard deviation is half the reach."""
-    # Dense passes count no more than others: of the points along them, some stand for all.
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    chosen = np.unique(np.floor(along / (options.thinned * reach)), return_index=True)[1]
+    """Return the matrix (N, N) of weights with the sum 1 in each row.
+
+    They fall with the distance to zero at the reach (biweight), and with the cosine between axes to zero at `similar`.
+    """
+    # Dense passes, and points along them, count no more than others: of the points in a cube, the first stands for all.
+    cubes = np.floor(points / (options.thinned * reach)).astype(np.int64)
+    chosen = np.sort(np.unique(cubes, axis=0, return_index=True)[1])
     count = min(options.neighbours, len(chosen))
     found = KDTree(points[chosen]).query(points, k=count, distance_upper_bound=reach)
     distance, index = np.asarray(found[0]).reshape(len(points), -1), np.asarray(found[1]).reshape(len(points), -1)
     known = np.isfinite(distance)
     row = np.broadcast_to(np.arange(len(points))[:, None], distance.shape)[known]
     column, d = chosen[index[known]], distance[known]
-    similar = np.einsum("ni,ni->n", axes[row], axes[column]) > options.similar
+    alike = (np.einsum("ni,ni->n", axes[row], axes[column]) - options.similar) / (1.0 - options.similar)
+    similar = alike > 0.0
     own = np.flatnonzero(np.bincount(row[similar], minlength=len(points)) == 0)  # none is alike
     row, column = np.concatenate([row[similar], own]), np.concatenate([column[similar], own])
-    d = np.concatenate([d[similar], np.zeros(len(own))])
-    matrix = coo_array((np.exp(-2.0 * (d / reach) ** 2), (row, column)), shape=(len(points), len(points))).tocsr()
+    near = 1.0 - (d[similar] / reach) ** 2
+    weight = np.concatenate([np.minimum(2.0 * alike[similar], 1.0) * near * near, np.ones(len(own))])
+    matrix = coo_array((weight, (row, column)), shape=(len(points), len(points))).tocsr()
     total = np.asarray(matrix.sum(axis=1)).ravel()
     return csr_array(matrix.multiply(1.0 / total[:, None]))
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
-from pentapod.geometry.directions import NEARLY_OPPOSITE, angle_between, turned
+from pentapod.geometry.directions import NEARLY_OPPOSITE, angle_between, eased, turned
 from pentapod.geometry.polyline import arc_length, spaced
 from pentapod.toolpath.options import Entry
 from pentapod.toolpath.toolpath import Segment, SegmentKind
@@ -120,7 +120,7 @@ def turning(start: Floats, end: Floats, t: Floats, view: Floats) -> Floats:
 
     Opposite axes are joined by way of the view (3,).
     """
-    t = t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
+    t = eased(t)
     angle = float(angle_between(start, end))
     if angle < 1e-9:
         axes = (1.0 - t)[:, None] * start + t[:, None] * end
