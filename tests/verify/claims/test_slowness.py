@@ -8,6 +8,7 @@ import replay_cases as cases
 
 from pentapod.base.errors import ArrayError
 from pentapod.geometry.polyline import arc_length
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import verify
 from pentapod.verify.claims.slowness import unasked_stop
 
@@ -164,3 +165,63 @@ def test_a_rest_above_a_reversal_is_an_unasked_stop(linear):
     found = judged(linear, standing(replace(linear, program=program), row, 0.03))[STOP]
     assert not found.passed
     assert found.value == pytest.approx(0.03, abs=5e-3)
+
+
+ROCK = np.radians(3.0)
+"""Angle of a turn about the ball's centre, there and back, amid a cut."""
+
+
+@pytest.fixture(scope="module")
+def rocking(linear):
+    """A case whose tool rocks amid its only cut, and the rows at which it begins to, turns back, and ends."""
+    up, flat = np.array([0.0, 0.0, 1.0]), SegmentKind.CUT
+    leaning = np.array([0.0, np.sin(ROCK), np.cos(ROCK)])
+    begin, amid, end = (np.array([x, 0.0, 0.0]) for x in (-0.01, 0.0, 0.01))
+    parts = [
+        cases.straight(flat, cases.FEED, begin, amid, up, count=11),
+        cases.turn(amid, up, leaning, 4),
+        cases.turn(amid + cases.BALL * (up - leaning), leaning, up, 4),
+        cases.straight(flat, cases.FEED, amid, end, up, count=11),
+    ]
+    tips, axes = (
+        np.concatenate([part.pose(np.linspace(0.0, 1.0, part.count))[k][min(n, 1) :] for n, part in enumerate(parts)])
+        for k in range(2)
+    )
+    toolpath = Toolpath((Segment(flat, tips, axes, cases.FEED),), tilt_centre=cases.BALL)
+    program = cases.program_of(linear.machine, *cases.timed(parts), interpolation="linear")
+    rows = [len(cases.timed(parts[: k + 1])[0]) - 1 for k in range(3)]
+    return replace(linear, toolpath=toolpath, program=program), rows
+
+
+def test_a_rest_where_only_the_legs_have_a_corner_has_a_reason(rocking):
+    """The path of the ball's centre goes straight on, and the axis turns by 6 degrees in all."""
+    case, _ = rocking
+    assert unasked_stop(cases.replay_of(case)).passed
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
+@pytest.mark.parametrize("turn", [0, 1])
+def test_a_rest_amid_a_turn_on_the_spot_is_an_unasked_stop(rocking, turn, share):
+    """The ball's centre is at the corner, but the legs go on as they came."""
+    case, rows = rocking
+    row = round(rows[turn] + share * (rows[turn + 1] - rows[turn]))
+    found = unasked_stop(cases.replay_of(case, standing(case, row, 0.1)))
+    assert not found.passed
+    assert found.value == pytest.approx(0.1, abs=3e-3)
+
+
+@pytest.mark.parametrize("short", [0.06e-3, 0.2e-3, 2e-3])
+def test_a_rest_just_before_or_behind_a_corner_of_the_legs_is_an_unasked_stop(rocking, short):
+    case, rows = rocking
+    tips = cases.replay_of(case).tilt_centres[::2]
+    away = np.linalg.norm(tips - tips[rows[0]], axis=1)
+    for row in (int(np.flatnonzero(away[: rows[0]] >= short)[-1]), int(np.argmax(away[rows[2] :] >= short)) + rows[2]):
+        found = unasked_stop(cases.replay_of(case, standing(case, row, 0.1)))
+        assert not found.passed
+        assert found.value >= 0.09
+
+
+def test_a_rest_at_a_corner_of_the_legs_is_short(rocking):
+    case, rows = rocking
+    for row in rows:
+        assert not unasked_stop(cases.replay_of(case, standing(case, row, 1.0))).passed

@@ -12,6 +12,7 @@ from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import marked_runs
+from pentapod.numerics.blocks import blocks
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.claims.speed import row_speeds
 from pentapod.verify.claims.stops_and_dwells import STILL_M, required_stops
@@ -94,7 +95,8 @@ def unasked_stop(replay: Replay) -> Finding:
     row = int(runs[worst, 0]) if value > 0.0 else 0
     method = (
         f"longest time at rest without a reason; within the path tolerance of dwells, ends of segments and corners of "
-        f"more than {math.degrees(corner):g} deg only the time beyond the dwell and {OPTIONS.spare_s:g} s counts; the "
+        f"more than {math.degrees(corner):g} deg, of the path or of tool and legs, only the time beyond the dwell and "
+        f"{OPTIONS.spare_s:g} s counts; the "
         "robot is at rest when no leg is faster than its jerk limit allows within a period, or than "
         f"{OPTIONS.creep:.0%} of the slowest feed"
     )
@@ -150,7 +152,9 @@ def _raise(used: Floats, shares: Floats) -> None:
 def _reasons(replay: Replay, runs: Ints, least: float) -> tuple[Bools, Floats]:
     """Return for each run of steps whether there is a reason to be at rest, and the required dwell, seconds.
 
-    least: corners of more radians are a reason.
+    least: corners of more radians are a reason. Where the tool turns, the legs may have a corner though the path of the
+    tilt centre has none: it counts where the toolpath turns by as much as a motion of two points of the tool, and the
+    program's legs leave the rest in another direction than they came.
     """
     path, match = replay.toolpath, replay.match
     arc = arc_length(path.tilt_centres)
@@ -158,19 +162,59 @@ def _reasons(replay: Replay, runs: Ints, least: float) -> tuple[Bools, Floats]:
     low, high = arcs[runs[:, 0]] - within, arcs[np.minimum(runs[:, 1], len(arcs) - 1)] + within
     ends = arc[path.starts]
     reasons = np.searchsorted(ends, high, "right") > np.searchsorted(ends, low, "left")
+    behind = np.searchsorted(arc, high, "right")
+    first = np.minimum(np.searchsorted(arc, low, "left"), behind)
     # Turning of the path, of its direction and its axis, summed up to each waypoint.
-    step = np.diff(path.tilt_centres, axis=0)
-    moving = np.linalg.norm(step, axis=1) > 0.0
-    corner = np.zeros(len(arc))
-    at = np.flatnonzero(moving)
-    corner[at[1:]] = angle_between(step[at[:-1]], step[at[1:]])
-    turned = np.append(0.0, np.cumsum(corner + np.append(0.0, angle_between(path.axes[:-1], path.axes[1:]))))
-    first, behind = np.searchsorted(arc, low, "left"), np.searchsorted(arc, high, "right")
-    reasons |= turned[behind] - turned[np.minimum(first, behind)] > least
+    turned = _turning(path.tilt_centres) + np.append(
+        np.zeros(2), np.cumsum(angle_between(path.axes[:-1], path.axes[1:]))
+    )
+    reasons |= turned[behind] - turned[first] > least
+    above = path.tilt_centres + (replay.machine.tool_length - path.tilt_centre) * path.axes
+    turned = _turning(np.concatenate([path.tilt_centres, above], axis=1))
+    reasons |= (turned[behind] - turned[first] > least) & (_turns_at_rest(replay, runs) > least)
     dwell = np.zeros(len(runs))
     for begin, end, seconds in required_stops(replay):
         dwell += np.where((runs[:, 0] < end) & (runs[:, 1] > begin), seconds, 0.0)
     return np.asarray(reasons), dwell
+
+
+def _turning(points: Floats) -> Floats:
+    """Return the angles by which a polyline through points (N, K) turns, summed before each, and over all (N + 1,)."""
+    step = np.diff(points, axis=0)
+    at = np.flatnonzero(np.linalg.norm(step, axis=1) > 0.0)
+    directions = step[at] / np.linalg.norm(step[at], axis=1, keepdims=True)
+    corner = np.zeros(len(points))
+    corner[at[1:]] = _angles(directions[:-1], directions[1:])
+    return np.append(0.0, np.cumsum(corner))
+
+
+def _turns_at_rest(replay: Replay, runs: Ints) -> Floats:
+    """Return for each run of steps the angle between the ways in which the legs come to rest there and go on, radians.
+
+    Ways are chords of the path tolerance or a little more in the space of leg lengths; 0 where the program has none.
+    """
+    legs, turns = replay.program.legs, np.zeros(len(runs))
+    for k, (begin, end) in enumerate(runs.tolist()):
+        came, goes = _way(legs[begin::-1], replay.path_tolerance), _way(legs[end:], replay.path_tolerance)
+        if came is not None and goes is not None:
+            turns[k] = _angles(-came[None], goes[None])[0]
+    return turns
+
+
+def _way(legs: Floats, length: float) -> Floats | None:
+    """Return the direction (K,) from the first of rows (N, K) to the next that is so far from it; None without one."""
+    for part in blocks(len(legs), 64):
+        chords = legs[part] - legs[0]
+        far = np.linalg.norm(chords, axis=1)
+        if (far >= length).any():
+            row = int(np.argmax(far >= length))
+            return chords[row] / far[row]
+    return None
+
+
+def _angles(a: Floats, b: Floats) -> Floats:
+    """Return the angles between unit vectors (N, K), radians, accurate at 0 and at π."""
+    return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
 
 
 CLAIMS = (
