@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from left_material import facet_distances
 from pentapod import Mesh
 from pentapod.base.errors import MeshError
-from pentapod.mesh.offset.offset_surface import offset_surface, onto_level
+from pentapod.mesh.offset.offset_surface import Window, offset_surface, onto_level
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.theory.level_set import enclosed_volume
 
@@ -145,6 +145,26 @@ def test_faces_in_line_with_the_grid_do_no_harm(low):
     vertices, triangles = offset(Mesh.of(*box([low] * 3, [low + 8 * R] * 3)), step=R / 4)
     assert np.isfinite(vertices).all()
     assert facets_at_edges(triangles) == {2: len(triangles) * 3 // 2}
+
+
+@pytest.mark.parametrize("view", [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8)])
+def test_offset_in_a_window_through_a_part_is_that_of_the_whole_part_to_the_bit(view):
+    """A solid block with a slot: the window cuts through the solid, where a mirrored sheet is within the block."""
+    part = joined(
+        box((0.0, 0.0, 0.0), (0.04, 0.012, 0.005)), box((0.0, 0.0, 0.005), (0.018, 0.012, 0.008)),
+        box((0.021, 0.0, 0.005), (0.04, 0.012, 0.008)),
+    )  # fmt: skip
+    low, high = np.array([0.016, 0.003, 0.002]), np.array([0.026, 0.006, 0.0105])
+    window = Window(np.stack([low, high]), np.array(view))
+    whole = offset(part, distance=1e-3, step=2e-4, parts=4)
+    cut = offset_surface(FacetTree.of(part), 1e-3, 2e-4, 4, window)
+    assert len(cut[1]) < 0.6 * len(whole[1])
+
+    def within(vertices, triangles):
+        return vertices[triangles[((vertices > low) & (vertices < high)).all(axis=1)[triangles].all(axis=1)]]
+
+    assert len(within(*whole)) > 500
+    np.testing.assert_array_equal(within(*cut), within(*whole))
 
 
 def test_a_part_too_large_for_the_ball_is_refused():

@@ -99,6 +99,34 @@ def test_links_follow_the_surface_and_are_clear(pocket):
             assert np.linalg.norm(np.diff(link, axis=0), axis=1).sum() <= 2.6 * np.linalg.norm(end - start) + 1e-3
 
 
+def test_passes_over_a_region_are_those_of_the_whole_part():
+    """A slot beside a wall and a roof over a part of it: both are beyond the region's box, but bear on its passes."""
+    walls = [[(0, 0, 0), (60, 12, 3)], [(0, 0, 3), (8, 12, 6)], [(11, 0, 3), (60, 12, 6)],
+             [(8, 8.5, 6), (60, 12, 8)], [(12, 0, 9), (60, 12, 11)]]  # fmt: skip
+    shape = part(blocks(*(1e-3 * np.array(b, dtype=float) for b in walls)))
+    region = Region(box=1e-3 * np.array([(2, 1, 1), (14, 8, 7)]))
+    options = RasterOptions(stepover=1.5e-3, region=region)
+    own, whole = (DriveSurface.of(shape, 1e-3, UP, region=each) for each in (region, None))
+    assert len(own.mesh.faces) < 0.6 * len(whole.mesh.faces)
+    found, expected = (surface.waypoints(raster_paths(surface, options).passes, options) for surface in (own, whole))
+    assert len(found) > 4
+    for field in ("points", "normals", "starts"):
+        np.testing.assert_array_equal(getattr(found, field), getattr(expected, field))
+
+
+def test_a_small_region_of_a_large_part_is_machined():
+    """A plate of 3 m: the drive surface of all of it would be too fine. A wall beside the region keeps the ball off."""
+    shape = part(blocks([(-1.5, -1.5, -0.02), (1.5, 1.5, 0.0)], [(0.031, -0.1, -0.001), (0.05, 0.1, 0.03)]))
+    region = Region(box=[(-0.03, -0.03, -0.001), (0.03, 0.03, 0.001)])
+    made = make_toolpath(shape, BallCutter(R), RasterOptions(stepover=6e-3, region=region))
+    cut = np.unique([k for k in made.segment_of_interval if made.segments[k].kind is SegmentKind.CUT])
+    rows = np.flatnonzero(np.isin(made.segment_of_interval, cut))
+    centres = made.tilt_centres[np.union1d(rows, rows + 1)]
+    np.testing.assert_allclose(centres.min(axis=0), [-0.03, -0.03, R], atol=3e-3)
+    assert centres[:, 0].max() == pytest.approx(0.031 - R, abs=1e-5)
+    assert centres[:, 1].max() == pytest.approx(0.03, abs=3e-3)
+
+
 def contacts_at(surface, centres):
     """Passes of two points that begin and end at centres (N, 3)."""
     normals = surface.centres.normals(centres)

@@ -107,13 +107,14 @@ def move_onto_level(
     """Move points (N, 3) to where their distance from the mesh is `level`; fill the distances (N,) that they reach.
 
     accuracy: metres; what is nearer to the level is not moved. rounds: steps at most; none is longer than the level.
+    No point depends on the others.
     """
     nodes, bounds, away = np.empty(STACK, dtype=np.intp), np.empty(STACK), np.zeros(6)
     facets, normals, needed = np.empty(_MOST, dtype=np.intp), np.empty((_MOST, 3)), np.empty(_MOST)
-    step, g, last, slack = np.empty(3), np.empty(3), -1, 0.1 * accuracy
+    step, g, slack = np.empty(3), np.empty(3), 0.1 * accuracy
     for m in range(len(points)):
         p, count = points[m], 0
-        gap, last = closest(p[0], p[1], p[2], math.inf, last, corners, starts, extents, nodes, bounds, away)
+        gap, last = closest(p[0], p[1], p[2], math.inf, -1, corners, starts, extents, nodes, bounds, away)
         for _ in range(rounds):
             if abs(gap - level) <= accuracy or gap <= 0.0:
                 break

@@ -23,11 +23,12 @@ def cross_level(
 
     axes (E,): along which the edges run. lengths (E,): of the edges, metres. At one end the distance is above the
     level, at the other not. Regula falsi with the Illinois rule; bisection where that does not end.
+    Where two facets are as near, no edge depends on the others: none begins with a facet of the one before.
     """
     nodes, bounds, away = np.empty(STACK, dtype=np.intp), np.empty(STACK), np.zeros(6)
-    p, facet = np.empty(3), -1
+    p = np.empty(3)
     for m in range(len(starts)):
-        axis, low, high, side = axes[m], 0.0, lengths[m], 0
+        axis, low, high, side, facet = axes[m], 0.0, lengths[m], 0, -1
         p[:] = starts[m]
         distance, facet = closest(p[0], p[1], p[2], np.inf, facet, corners, leaf_starts, extents, nodes, bounds, away)
         at_low = distance - level

@@ -80,6 +80,17 @@ class FacetTree:
         all_within(np.ascontiguousarray(points), distance, self.corners, self.starts, self.extents, found)
         return found
 
+    def clear(self, starts: Floats, ends: Floats, least: float) -> Bools:
+        """Return which chords (M,) are nowhere nearer to the mesh than `least` metres."""
+        from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415 - loads numba
+
+        count = len(starts)
+        distances, where, facets = np.empty(count), np.empty((count, 4)), np.empty(count, dtype=np.intp)
+        nearest_all(
+            starts, ends - starts, self.corners, self.boxes, self.starts, least, False, distances, where, facets
+        )
+        return facets < 0
+
 
 def along_morton_curve(points: Floats, bounds: Floats) -> Ints:
     """Return the order (N,) along a Morton curve of points (N, 3) within bounds (2, 3); neighbours in it are close."""

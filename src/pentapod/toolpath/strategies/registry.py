@@ -85,7 +85,7 @@ def surface_for(mesh: Mesh, tool: Tool, options: PathOptions) -> Surface:
     if rolls_over(tool, options):
         under = options.under if isinstance(options, CoverOptions) else None
         drive = DriveOptions() if under is None else DriveOptions().leaning(under / tool.tilt_centre)
-        return DriveSurface.of(mesh, tool.tilt_centre, options.up, drive)
+        return DriveSurface.of(mesh, tool.tilt_centre, options.up, drive, options.region)
     return PartSurface(mesh, tool, options.up)
 
 

@@ -35,7 +35,8 @@ class DriveOptions(Value):
     as shares of the radius: walls, and valleys between steep flanks, do not hide themselves, nor do walls that lean
     under by less. under: the same as `sideways` for links, which may lead a little farther; upright: and for those
     between ends over which nothing leans. evened: how often the stepover for a scallop is averaged with that of
-    neighbouring facets, whose curvature is noisy.
+    neighbouring facets, whose curvature is noisy. about: how far beyond what the ball touches in a region's box the
+    surface is made, as a multiple of the radius: links may lead there.
     """
 
     step: float = 0.25
@@ -56,6 +57,7 @@ class DriveOptions(Value):
     upright: float = 0.01
     above: float = 0.2
     evened: int = 2
+    about: float = 3.0
 
     def leaning(self, share: float) -> DriveOptions:
         """Return options by which the surface may lean over a point by a share of the radius."""
@@ -188,14 +190,7 @@ class BallCentres:
 
     def clear(self, starts: Floats, ends: Floats, least: float) -> Bools:
         """Return which chords (M,) are nowhere nearer to the part than `least` metres."""
-        from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415  loads numba
-
-        count, tree = len(starts), self.tree
-        distances, where, facets = np.empty(count), np.empty((count, 4)), np.empty(count, dtype=np.intp)
-        nearest_all(
-            starts, ends - starts, tree.corners, tree.boxes, tree.starts, least, False, distances, where, facets
-        )
-        return facets < 0
+        return self.tree.clear(starts, ends, least)
 
 
 def places(passes: Passes) -> tuple[Floats, Floats, Floats]:

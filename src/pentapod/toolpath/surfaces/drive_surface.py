@@ -1,6 +1,7 @@
 """Drive surface: where the centre of a ball is that rolls over the part and cuts into it nowhere.
 
-It is the offset surface of the part at the ball's radius, seen from outside. Lines are drawn on it as on any mesh.
+It is the offset surface of the part at the ball's radius, seen from outside. Lines are drawn on it as on any mesh. For
+a region with a box it is made around this box only, so that the rest of the part may be of any size.
 Points are then put exactly on the offset, and chords between them are proven clear by their exact distance from the
 part. A ball is clear at a centre whatever its axis, so nothing of this depends on the tool axis.
 """
@@ -18,7 +19,7 @@ from pentapod.base.arrays import Bools, Floats
 from pentapod.geometry.directions import tangent_frame, turned
 from pentapod.geometry.polyline import arc_length
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.offset.offset_surface import offset_surface
+from pentapod.mesh.offset.offset_surface import Window, offset_surface
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.heightfield import HeightField
@@ -31,7 +32,7 @@ from pentapod.toolpath.surface import Contacts
 from pentapod.toolpath.surfaces.ball_centres import BallCentres, DriveOptions, smoothed
 from pentapod.toolpath.surfaces.ways_around import drawn_taut, shortest_ways
 
-_KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, DriveOptions], tuple[FacetTree, Mesh]]] = WeakKeyDictionary()
+_KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, DriveOptions, bytes], tuple[FacetTree, Mesh]]] = WeakKeyDictionary()
 """Drive surfaces of parts that are in use: planning and the verdict need the same."""
 
 
@@ -59,17 +60,29 @@ class DriveSurface:
         return self.centres.options
 
     @classmethod
-    def of(cls, part: Mesh, radius: float, view: Floats, options: DriveOptions | None = None) -> DriveSurface:
-        """Return the drive surface of a part. Raises MeshError where the part is too large for the ball."""
+    def of(
+        cls,
+        part: Mesh,
+        radius: float,
+        view: Floats,
+        options: DriveOptions | None = None,
+        region: Region | None = None,
+    ) -> DriveSurface:
+        """Return the drive surface of a part, as far as it is needed for a region, if one is given.
+
+        Raises MeshError where part or region is too large for the ball.
+        """
         options = options or DriveOptions()
+        window = None if region is None else _window(part, radius, view, options, region)
+        key = radius, options, b"" if window is None else window.box.tobytes() + window.view.tobytes()
         known = _KNOWN.setdefault(part, {})
-        if (radius, options) not in known:
+        if key not in known:
             tree = FacetTree.of(part)
-            vertices, faces = offset_surface(tree, radius, options.step * radius, options.parts)
+            vertices, faces = offset_surface(tree, radius, options.step * radius, options.parts, window)
             # A line goes on over creases of the drive surface: no edge of it parts passes.
             mesh = Mesh.of(vertices, faces, source=part.diagnosis.source, crease_angle=np.pi)
-            known[radius, options] = tree, mesh
-        tree, mesh = known[radius, options]
+            known[key] = tree, mesh
+        tree, mesh = known[key]
         return cls(part, mesh, BallCentres(tree, radius, options), view)
 
     @cached_property
@@ -247,3 +260,26 @@ class DriveSurface:
         np.maximum.at(furthest, piece, beyond)
         bridged = (beyond > 0.0) & (furthest[piece] < self.options.enters * self.radius)
         return np.where(bridged, -step, beyond)
+
+
+def _window(part: Mesh, radius: float, view: Floats, options: DriveOptions, region: Region) -> Window | None:
+    """Return where the drive surface is needed for a region; None for all of it.
+
+    That is around what lies in the region's box, and along the view up to the top of the part above.
+    """
+    if region.box is None:
+        return None
+    inside = Patch.whole(part).in_box(region)
+    box = np.array(region.bounds)
+    if len(inside.faces):
+        box = np.stack([inside.vertices.min(axis=0), inside.vertices.max(axis=0)])
+    around = (1.0 + options.about) * radius
+    box = box + np.array([[-around], [around]])
+    corners = np.array([[box[k >> axis & 1, axis] for axis in range(3)] for k in range(8)])
+    column = Patch.whole(part)
+    for side in tangent_frame(view):
+        for sense in (1.0, -1.0):
+            column, _ = column.above(sense * (column.vertices @ side), float((sense * (corners @ side)).min()))
+    top = float((column.vertices @ view).max(initial=-np.inf)) + 2.0 * radius
+    rise = max(top - float((corners @ view).min()), 0.0) * view
+    return Window(np.stack([np.minimum(box[0], box[0] + rise), np.maximum(box[1], box[1] + rise)]), view)
