@@ -53,7 +53,7 @@ def timed(action: Callable[[], Value]) -> tuple[Value, float]:
 
 def start_of(problem: PlacementProblem) -> Candidate:
     """Return the first candidate of the best first guess."""
-    guess = first_guesses(problem)[0]
+    guess = next(first_guesses(problem))
     return first_candidate(problem, guess.margins, guess.transform)
 
 

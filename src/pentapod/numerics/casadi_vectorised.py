@@ -70,6 +70,35 @@ class Vectorised:
                     out[what][into, part] = work[b]
 
 
+class PointByPoint:
+    """The last output of a casadi function, dense, at a few points; evaluated in place, without copies.
+
+    Called with the numbers of each input in casadi's column-major order: (N, numbers), or (numbers,) for all points.
+    Returns an array (N, numbers). Not to be called by two threads at a time.
+    """
+
+    def __init__(self, function: Any) -> None:
+        self._given = [np.zeros(int(function.numel_in(k))) for k in range(function.n_in())]
+        last = int(function.n_out()) - 1
+        self._found = np.zeros(int(function.numel_out(last)))
+        self._buffer, self._evaluate = function.buffer()
+        for k, numbers in enumerate(self._given):
+            self._buffer.set_arg(k, memoryview(numbers))
+        self._buffer.set_res(last, memoryview(self._found))
+
+    def __call__(self, *inputs: Floats) -> Floats:
+        """Return the output at all points."""
+        each = [np.atleast_2d(x) for x in inputs]
+        count = max(len(x) for x in each)
+        out = np.empty((count, len(self._found)))
+        for k in range(count):
+            for numbers, x in zip(self._given, each, strict=True):
+                numbers[:] = x[k if len(x) > 1 else 0]
+            self._evaluate()
+            out[k] = self._found
+        return out
+
+
 _CONSTANT, _INPUT, _OUTPUT, _UNARY = -1, -2, -3, -4
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
@@ -108,7 +109,7 @@ class Estimator:
             places = [(margins, problem.constraints.nearest_to(near.candidate.transform))]
         elif problem.constraints.moves:
             sampling = SamplingOptions(tries=self.options.tries, ranked=self.options.ranked)
-            guesses = first_guesses(problem, 0, sampling)[: self.options.starts]
+            guesses = islice(first_guesses(problem, 0, sampling), self.options.starts)
             return [(guess.margin, problem, guess.margins, guess.transform) for guess in guesses]
         else:
             places = [(margins, pose) for pose in problem.constraints.poses for margins in problem.margins]

@@ -15,7 +15,7 @@ from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.planning import plan
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.base_reconfiguration import reconfigured
-from pentapod.planning.placement.curvature import Curvature
+from pentapod.planning.placement.curvature import Curvature, Multipliers
 from pentapod.planning.placement.rail_positions import at_rail_positions
 from pentapod.planning.placement.search import search
 from pentapod.planning.problem.constraints import PlacementConstraints
@@ -89,7 +89,8 @@ def test_curvature_is_that_of_the_machine_with_its_guides_moved(sliding, here):
     strokes = np.flatnonzero(["too" in at.margins.limits[k].name for k in model.kinds])  # smooth everywhere
     multipliers = np.zeros(len(model.values) + len(model.steep))
     multipliers[rng.choice(strokes, 8, replace=False)] = rng.uniform(0.1, 1.0, 8)
-    bent = Curvature(start, Margins.of(sliding, COMPONENT), guides=True).hessian(model, at, multipliers)
+    known = Multipliers.of(model, multipliers, 0.0)
+    bent = Curvature(start, Margins.of(sliding, COMPONENT), guides=True).hessian(model, at, known)
     values, vectors = np.linalg.eigh(bent)
 
     def weighed(x):

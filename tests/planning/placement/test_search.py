@@ -64,3 +64,13 @@ def test_an_interruption_of_the_look_without_obstacles_ends_the_search(desk, cap
             options=SearchOptions(hopeless=np.inf),
         )
     assert len(improved) == 1
+
+
+def test_first_guesses_judged_in_part_are_those_judged_whole(desk, cap):
+    """No placement is left out because of the waypoints at which all are judged first."""
+    problem = PlacementProblem.of(ToolpathSamples.of(cap, np.radians(15.0)), desk)
+    few, every = (
+        list(first_guesses(problem, options=SamplingOptions(tries=600, ranked=12, first=first))) for first in (2, 12)
+    )
+    assert [guess.margin for guess in few] == [guess.margin for guess in every]
+    assert [guess.margin for guess in few] == sorted((guess.margin for guess in few), reverse=True)

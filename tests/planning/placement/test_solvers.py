@@ -28,7 +28,7 @@ def problem(desk):
 
 @pytest.fixture(scope="module")
 def start(problem, desk):
-    guess = first_guesses(problem, options=SamplingOptions(tries=2000))[0]
+    guess = next(first_guesses(problem, options=SamplingOptions(tries=2000)))
     return first_candidate(problem, guess.margins, guess.transform)
 
 

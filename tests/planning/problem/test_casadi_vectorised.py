@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS
-from pentapod.numerics.casadi_vectorised import Vectorised
+from pentapod.numerics.casadi_vectorised import PointByPoint, Vectorised
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.problem.formulation import point_function
 from pentapod.planning.problem.problem import PlacementProblem
@@ -63,3 +63,14 @@ def test_an_operation_without_counterpart_is_named():
     a = ca.SX.sym("a")
     with pytest.raises(NotImplementedError, match="operation"):
         Vectorised(ca.Function("f", [a], [ca.erf(a)]))
+
+
+def test_point_by_point_is_casadis():
+    """Numbers of each point, and of all; the last output, column by column."""
+    a, b = ca.SX.sym("a", 2), ca.SX.sym("b", 2, 2)
+    function = ca.Function("f", [a, b], [ca.dot(a, a), ca.mtimes(b, ca.horzcat(a, ca.sqrt(a)))])
+    rng = np.random.default_rng(3)
+    points, given = rng.uniform(1.0, 2.0, (5, 2)), rng.normal(size=(2, 2))
+    found = PointByPoint(function)(points, given.ravel(order="F"))
+    for k, point in enumerate(points):
+        np.testing.assert_array_equal(found[k], np.asarray(function(point, given)[1]).ravel(order="F"))

@@ -22,7 +22,7 @@ COST = CostOptions()
 
 def candidate_of(instance, desk):
     problem = PlacementProblem.of(ToolpathSamples.of(instance.toolpath, max(instance.tilt, 0.1)), desk)
-    guess = first_guesses(problem, options=SamplingOptions(tries=2000))[0]
+    guess = next(first_guesses(problem, options=SamplingOptions(tries=2000)))
     return problem, first_candidate(problem, guess.margins, guess.transform)
 
 

@@ -158,7 +158,7 @@ def test_short_paths_and_single_places_have_a_course(moved, desk):
     tilt_centres = np.array(moved)[:, None] * [1.0, 0.0, 0.0]
     task = ToolpathSamples(tilt_centres, np.tile([0.0, 0.0, 1.0], (len(tilt_centres), 1)), 0.003, 0.2)
     problem = PlacementProblem.of(task, desk)
-    guess = first_guesses(problem, options=SamplingOptions(tries=500))[0]
+    guess = next(first_guesses(problem, options=SamplingOptions(tries=500)))
     start = first_candidate(problem, guess.margins, guess.transform)
     strict = problem.values_of(start.margins, start.transform, np.zeros_like(tilt_centres)).min()
     smooth = smoothed(problem, start, strict - 0.01)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Floats, Ints
 from pentapod.numerics.convex.dense_qp import dense_qp
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.problem.formulation import curvature_function
@@ -21,10 +21,48 @@ from pentapod.planning.problem.problem import Candidate, PlacementProblem
 
 @dataclass(frozen=True)
 class CurvatureOptions:
-    """active: multiplier above which a constraint is active. largest_gain: bound on a step's increase of the margin."""
+    """active: multiplier above which a constraint is active. largest_gain: bound on a step's increase of the margin.
 
-    active: float = 1e-6
+    nearest: inequalities of the first program of a step, those that a step within the trust region reaches soonest;
+    those that its answer violates by more than `off` join, until none is.
+    """
+
+    active: float = 1e-4
     largest_gain: float = 0.1
+    nearest: int = 240
+    off: float = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Multipliers of active constraints: margins of kinds (R,) at waypoints points (R,), and leans at steep (S,)."""
+
+    points: Ints
+    kinds: Ints
+    margins: Floats
+    steep: Ints
+    leans: Floats
+
+    @classmethod
+    def of(cls, model: LinearModel, multipliers: Floats, active: float) -> Multipliers:
+        """Return those above `active` of the multipliers (m,) of a model's inequalities."""
+        margins, leans = multipliers[: len(model.values)], multipliers[len(model.values) :][: len(model.steep)]
+        rows, steep = np.flatnonzero(margins > active), np.flatnonzero(leans > active)
+        return cls(model.points[rows], model.kinds[rows], margins[rows], model.steep[steep], leans[steep])
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A step (p,), the change of coefficients (size, 2), their predicted increase of the margin.
+
+    length: the largest of the unknowns, to be compared with the radius. multipliers: None where no program was solved.
+    """
+
+    move: Floats
+    change: Floats
+    predicted: float
+    length: float = 0.0
+    multipliers: Multipliers | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,41 +74,63 @@ class Curvature:
     guides: bool = False
     options: CurvatureOptions = CurvatureOptions()
 
-    def best_step(self, model: LinearModel, at: Candidate, radius: float) -> tuple[Floats, Floats, float]:
-        """Return the step (p,), the change of coefficients (size, 2), and their predicted increase of the margin.
+    def best_step(self, model: LinearModel, at: Candidate, radius: float, known: Multipliers | None = None) -> Step:
+        """Return the step of the largest predicted margin within a trust region of this radius.
 
-        radius: of the trust region.
+        known: multipliers of the step before; without, they are those of a linear program.
         """
         matrix, upper = model.inequalities()
         count = matrix.shape[1]
         box = np.append(np.full(count - 1, radius), self.options.largest_gain)
-        near = upper < np.abs(matrix) @ box  # the others cannot be active
-        matrix = np.vstack([matrix[near], np.eye(count), -np.eye(count)])
-        upper = np.concatenate([upper[near], box, box])
         gradient, hessian = np.append(np.zeros(count - 1), -1.0), np.zeros((count, count))
-        answer = dense_qp(hessian, gradient, matrix, upper)
-        if answer is not None:
-            multipliers = np.zeros(len(near))
-            multipliers[near] = answer[1][: int(near.sum())]
-            hessian[:-1, :-1] = self.hessian(model, at, multipliers)
-            answer = dense_qp(hessian, gradient, matrix, upper)
+        if known is None and (first := self._answer(hessian, gradient, matrix, upper, box)) is not None:
+            known = Multipliers.of(model, first[1], self.options.active)
+        answer = None
+        if known is not None:
+            hessian[:-1, :-1] = self.hessian(model, at, known)
+            answer = self._answer(hessian, gradient, matrix, upper, box)
         if answer is None:
-            return np.zeros(len(model.moves)), np.zeros_like(at.coefficients), 0.0
-        x = answer[0]
-        return *model.step_of(x[:-1]), float(x[-1] - 0.5 * x @ hessian @ x)
+            return Step(np.zeros(len(model.moves)), np.zeros_like(at.coefficients), 0.0)
+        x, multipliers = answer
+        predicted = float(x[-1] - 0.5 * x @ hessian @ x)
+        active = Multipliers.of(model, multipliers, self.options.active)
+        return Step(*model.step_of(x[:-1]), predicted, float(np.abs(x[:-1]).max(initial=0.0)), active)
 
-    def hessian(self, model: LinearModel, at: Candidate, multipliers: Floats) -> Floats:
+    def _answer(
+        self, hessian: Floats, gradient: Floats, matrix: Floats, upper: Floats, box: Floats
+    ) -> tuple[Floats, Floats] | None:
+        """Return x (n,) and the multipliers (m,) of `dense_qp` within the box |x| ≤ box (n,)."""
+        options, sides = self.options, np.eye(len(box))
+        reached = upper / np.maximum(np.abs(matrix) @ box, 1e-300)  # where it is above 1 a row cannot be active
+        chosen = reached < 1.0
+        if int(chosen.sum()) > options.nearest:
+            chosen = np.zeros(len(reached), dtype=np.bool_)
+            chosen[np.argpartition(reached, options.nearest)[: options.nearest]] = True
+        while True:
+            rows = np.flatnonzero(chosen)
+            answer = dense_qp(
+                hessian, gradient, np.vstack([matrix[rows], sides, -sides]), np.concatenate([upper[rows], box, box])
+            )
+            if answer is None:
+                return None
+            x, found = answer
+            violated = (matrix @ x > upper + options.off) & ~chosen
+            if not violated.any():
+                multipliers = np.zeros(len(matrix))
+                multipliers[rows] = found[: len(rows)]
+                return x, multipliers
+            chosen |= violated
+
+    def hessian(self, model: LinearModel, at: Candidate, multipliers: Multipliers) -> Floats:
         """Return the Lagrangian's Hessian by the unknowns x of the model, with negative eigenvalues set to zero."""
-        margins, leans = multipliers[: len(model.values)], multipliers[len(model.values) :][: len(model.steep)]
-        return _positive(self.of_margins(model, at, margins) + self._of_cone(model, at, leans))
+        return _positive(self.of_margins(model, at, multipliers) + self._of_cone(model, at, multipliers))
 
-    def of_margins(self, model: LinearModel, at: Candidate, multipliers: Floats) -> Floats:
-        """Return the Hessian of the margins, times their multipliers (R,), by the unknowns x of the model."""
+    def of_margins(self, model: LinearModel, at: Candidate, multipliers: Multipliers) -> Floats:
+        """Return the Hessian of the margins, times their multipliers, by the unknowns x of the model."""
         problem, function = self.problem, curvature_function(self.problem, self.margins, guides=self.guides)
-        active = multipliers > self.options.active
-        rows, inverse = np.unique(model.points[active], return_inverse=True)
+        rows, inverse = np.unique(multipliers.points, return_inverse=True)
         weights = np.zeros((len(rows), len(at.margins.limits)))
-        weights[inverse, model.kinds[active]] = multipliers[active]
+        weights[inverse, multipliers.kinds] = multipliers.margins
         samples, size, (length, count) = problem.samples, 2 * problem.basis.shape[1], model.moves.shape
         total = np.zeros((count + size, count + size))
         if not len(rows):
@@ -80,33 +140,31 @@ class Curvature:
         offsets = (
             [at.margins.scene.machine.rail_positions - self.margins.scene.machine.rail_positions] if self.guides else []
         )
-        for k, row in enumerate(rows):
-            bent = np.asarray(
-                function(
-                    *offsets, np.zeros(6), leans[k], samples.tilt_centres[row], samples.nominal[row],
-                    problem.domain.lean_plane.T, at.transform.rotation, at.transform.translation,
-                    touching[k], weights[k],
-                )
-            )  # fmt: skip
-            by_unknowns = np.zeros((length + 2, count + size))
-            by_unknowns[:length, :count] = model.moves
-            by_unknowns[length:, count:] = problem.cone * np.kron(problem.basis[row], np.eye(2))
-            total -= by_unknowns.T @ bent @ by_unknowns
+        bent = function(
+            *offsets, np.zeros(6), leans, samples.tilt_centres[rows], samples.nominal[rows],
+            problem.domain.lean_plane.ravel(), at.transform.rotation.T.ravel(), at.transform.translation,
+            touching, weights,
+        )  # fmt: skip
+        by_unknowns = np.zeros((len(rows), length + 2, count + size))
+        by_unknowns[:, :length, :count] = model.moves
+        by_lean = problem.basis[rows][:, None, :, None] * np.eye(2)[:, None, :]
+        by_unknowns[:, length:, count:] = problem.cone * by_lean.reshape(len(rows), 2, size)
+        for each, by in zip(bent.reshape(len(rows), length + 2, length + 2), by_unknowns, strict=True):
+            total -= by.T @ each @ by
         return total
 
-    def _of_cone(self, model: LinearModel, at: Candidate, multipliers: Floats) -> Floats:
+    def _of_cone(self, model: LinearModel, at: Candidate, multipliers: Multipliers) -> Floats:
         """Return the curvature of the cone constraints: that of a lean of length r is 1/r."""
         problem, count = self.problem, model.moves.shape[1]
         size = 2 * problem.basis.shape[1]
         total = np.zeros((count + size, count + size))
-        active = np.flatnonzero(multipliers > self.options.active)
-        rows = model.steep[active]
+        rows = multipliers.steep
         length = problem.steepness(at.coefficients, rows)
         aside = np.cross(problem.samples.nominal[rows], problem.leans(at.coefficients, rows))
         room = problem.samples.room(rows)
         aside /= np.maximum(length * problem.cone * room, 1e-12)[:, None]
         by_unknowns = by_field(problem.basis[rows] / room[:, None], aside @ problem.domain.lean_plane.T)
-        total[count:, count:] = (by_unknowns.T * (multipliers[active] / np.maximum(length, 1e-3))) @ by_unknowns
+        total[count:, count:] = (by_unknowns.T * (multipliers.leans / np.maximum(length, 1e-3))) @ by_unknowns
         return total
 
 

@@ -6,6 +6,7 @@ It is slower than the default solver by an order of magnitude; tests compare the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -69,12 +70,14 @@ class IpoptSolver:
     options: IpoptOptions = IpoptOptions()
     _solvers: dict[Any, Any] = field(default_factory=dict[Any, Any])
 
-    def raise_margin(self, start: Candidate, enough: float = np.inf, beat: float | None = None) -> Candidate:
+    def raise_margin(
+        self, start: Candidate, enough: float = np.inf, others: Sequence[Candidate] | None = None
+    ) -> Candidate:
         """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one.
 
-        beat: the largest margin of other candidates, of no use here.
+        others: candidates with which it is compared, of no use here.
         """
-        del beat
+        del others
         best, (rows, kinds), reach = start, self._first(start), 1.0
         touching = bool(start.margins.scene.collision_world.obstacles)
         for _ in range(self.options.rounds):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 
@@ -22,10 +23,11 @@ from pentapod.planning.problem.tool_access import tool_gaps
 class SamplingOptions:
     """How many random placements are tried, and which are kept.
 
-    tries: for each branch. kept: guesses returned for each branch, which differ by apart_m in place or apart_rad in
+    tries: for each branch. kept: guesses of each branch at most, which differ by apart_m in place or apart_rad in
     orientation. ranked: the best that are refined. largest_slope: greatest angle of the part's mean axis from the base
-    normal, radians. judged: waypoints at which a placement is judged. spreads: standard deviations in metres of the
-    samples around the best, one round each. fitted: waypoints to which the first tilt field is fitted.
+    normal, radians. judged: waypoints at which a placement is judged; first: of them, at which all are. spreads:
+    standard deviations in metres of the samples around the best, one round each. fitted: waypoints to which the first
+    tilt field is fitted.
     """
 
     tries: int = 12_000
@@ -35,6 +37,7 @@ class SamplingOptions:
     apart_rad: float = float(np.radians(15.0))
     largest_slope: float = float(np.radians(40.0))
     judged: int = 12
+    first: int = 3
     spreads: tuple[float, ...] = (0.08, 0.03)
     fitted: int = 192
 
@@ -51,28 +54,30 @@ class Guess:
     margin: float
 
 
-def first_guesses(problem: PlacementProblem, seed: int = 0, options: SamplingOptions = OPTIONS) -> list[Guess]:
-    """Return the best few random placements for each branch, the best first; the same for a seed.
+def first_guesses(problem: PlacementProblem, seed: int = 0, options: SamplingOptions = OPTIONS) -> Iterator[Guess]:
+    """Yield the best few random placements, none near another of its branch, the best first; the same for a seed.
 
-    Each placement is judged at a few representatives with their nominal axes, the best ones again with a cone of tilts
-    and with the obstacles.
+    Each placement is judged at a few representatives with their nominal axes, the best ones again with a cone of tilts.
+    Obstacles take most of the time, and no margin is larger with them: only placements are judged with them that are
+    among the best without them, when they are asked for.
     """
     samples, machine, constraints, tries = problem.samples, problem.machine, problem.constraints, options.tries
     rng = np.random.default_rng(seed)
     rows = samples.representatives(options.judged)
     centre, mean_axis = samples.tilt_centres.mean(axis=0), samples.nominal.mean(axis=0)
     mean_axis = mean_axis / max(float(np.linalg.norm(mean_axis)), 1e-9)
-    guesses: list[Guess] = []
     few = samples.at(rows)
     gaps = tool_gaps(few, problem.margins[0].scene)
-    for margins in problem.margins:
+    waiting: list[tuple[float, bool, int, int]] = []
+    found: list[list[RigidTransform]] = []
+    for branch, margins in enumerate(problem.margins):
         rotations = _rotations(mean_axis, -float(margins.scene.branch.w), tries, options.largest_slope, rng)
         places = _places(machine, tries, rng)
         if constraints.is_bounded:
             rotations, origins = constraints.within(rotations, places - rotations @ centre, rng)
             places = origins + rotations @ centre
         for spread in options.spreads:
-            best = _best(_score(samples, margins, rotations, places - rotations @ centre, rows), options.ranked)
+            best = _best(samples, margins, rotations, places - rotations @ centre, rows, options)
             repeat = tries // 3 // len(best)
             turned, near = rotations[best].repeat(repeat, axis=0), places[best].repeat(repeat, axis=0)
             rotations = np.concatenate([rotations[best], _turned(turned, spread, rng)])
@@ -81,10 +86,23 @@ def first_guesses(problem: PlacementProblem, seed: int = 0, options: SamplingOpt
                 rotations, origins = constraints.nearest(rotations, places - rotations @ centre)
                 places = origins + rotations @ centre
         translations = places - rotations @ centre
-        best = _best(_score(samples, margins, rotations, translations, rows), options.ranked)
-        poses = [constraints.nearest_to(RigidTransform(_orthonormal(rotations[k]), translations[k])) for k in best]
-        guesses += _best_different(few, margins, poses, gaps, options)
-    return sorted(guesses, key=lambda g: -g.margin)
+        best = _best(samples, margins, rotations, translations, rows, options)
+        poses = [RigidTransform(_orthonormal(rotations[k]), translations[k]) for k in best]
+        found.append([constraints.nearest_to(pose) for pose in poses])
+        bounds = _without_obstacles(few, margins, found[-1]).tolist()
+        waiting += [(-bound, False, branch, k) for k, bound in enumerate(bounds)]
+    heapify(waiting)
+    middle, kept = few.tilt_centres.mean(axis=0), [list[RigidTransform]() for _ in found]
+    while waiting:
+        negative, judged, branch, k = heappop(waiting)
+        margins, pose = problem.margins[branch], found[branch][k]
+        if len(kept[branch]) == options.kept or any(_near(pose, other, middle, options) for other in kept[branch]):
+            continue
+        if not judged and margins.scene.collision_world.obstacles:
+            heappush(waiting, (-float(best_tilted_margins(few, margins, pose, gaps)[0].min()), True, branch, k))
+        else:
+            kept[branch].append(pose)
+            yield Guess(margins, pose, -negative)
 
 
 def best_guess(problem: PlacementProblem, seed: int, options: SamplingOptions, waypoints: int) -> float:
@@ -93,7 +111,7 @@ def best_guess(problem: PlacementProblem, seed: int, options: SamplingOptions, w
     waypoints: number that represents the path where the placements are given.
     """
     if problem.constraints.moves:
-        return max(guess.margin for guess in first_guesses(problem, seed, options))
+        return next(first_guesses(problem, seed, options)).margin
     few = problem.samples.at(problem.samples.representatives(waypoints))
     poses, gaps = problem.constraints.poses, tool_gaps(few, problem.margins[0].scene)
     return max(float(best_tilted_margins(few, m, pose, gaps)[0].min()) for m in problem.margins for pose in poses)
@@ -151,33 +169,24 @@ def best_tilted_margins(
     return out, leans
 
 
-def _best(score: Floats, count: int) -> Ints:
-    return np.argsort(-score, kind="stable")[:count]
+def _best(
+    samples: ToolpathSamples, margins: Margins, r: Floats, t: Floats, rows: Ints, options: SamplingOptions
+) -> Ints:
+    """Return the best `ranked` of placements r (S, 3, 3), t (S, 3) by their smallest margin at `rows`.
 
-
-def _best_different(
-    few: ToolpathSamples,
-    margins: Margins,
-    poses: list[RigidTransform],
-    gaps: Floats | None,
-    options: SamplingOptions,
-) -> list[Guess]:
-    """Return the best guesses of a branch, none near another, the best first.
-
-    Obstacles take most of the time, and no margin is larger with them: only poses are judged with them that are among
-    the best without them.
+    No margin is above the smallest at the first rows: so most placements are judged there alone.
     """
-    centre = few.tilt_centres.mean(axis=0)
-    waiting = [(-bound, False, k) for k, bound in enumerate(_without_obstacles(few, margins, poses).tolist())]
-    heapify(waiting)
-    kept: list[Guess] = []
-    while waiting and len(kept) < options.kept:
-        negative, judged, k = heappop(waiting)
-        if not judged and margins.scene.collision_world.obstacles:
-            heappush(waiting, (-float(best_tilted_margins(few, margins, poses[k], gaps)[0].min()), True, k))
-        elif not any(_near(poses[k], other.transform, centre, options) for other in kept):
-            kept.append(Guess(margins, poses[k], -negative))
-    return kept
+    score = _score(samples, margins, r, t, rows[: options.first])
+    order, block = np.argsort(-score, kind="stable"), 4 * options.ranked
+    exact = np.full(len(score), -np.inf)
+    for start in range(0, len(order), block):
+        chosen = order[start : start + block]
+        best = np.sort(exact)[-options.ranked :]
+        if len(best) == options.ranked and score[chosen[0]] < best[0]:
+            break
+        rest = _score(samples, margins, r[chosen], t[chosen], rows[options.first :])
+        exact[chosen] = np.minimum(score[chosen], rest)
+    return np.argsort(-exact, kind="stable")[: options.ranked]
 
 
 def _without_obstacles(few: ToolpathSamples, margins: Margins, poses: list[RigidTransform]) -> Floats:
@@ -201,7 +210,7 @@ def _near(one: RigidTransform, other: RigidTransform, centre: Floats, options: S
 def _score(samples: ToolpathSamples, margins: Margins, r: Floats, t: Floats, rows: Ints) -> Floats:
     turned = np.einsum("sij,nj->sni", r, samples.nominal[rows])
     tips = np.einsum("sij,nj->sni", r, samples.tilt_centres[rows]) + t[:, None, :] - samples.tilt_centre * turned
-    return margins.own(tips, turned).min(axis=(-1, -2))
+    return margins.own(tips, turned).min(axis=(-1, -2), initial=np.inf)
 
 
 def _rotations(mean_axis: Floats, side: float, count: int, slope: float, rng: np.random.Generator) -> Floats:

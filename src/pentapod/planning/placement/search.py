@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
 from typing import Literal, Protocol
 
 import numpy as np
@@ -48,10 +49,12 @@ Start = tuple[Margins, RigidTransform]
 class Solver(Protocol):
     """A local solver: `sequential`, the default, or `ipopt`, the reference."""
 
-    def raise_margin(self, start: Candidate, enough: float = np.inf, beat: float | None = None) -> Candidate:
+    def raise_margin(
+        self, start: Candidate, enough: float = np.inf, others: Sequence[Candidate] | None = None
+    ) -> Candidate:
         """Return a candidate near `start` with the largest smallest margin, or with `enough`; never a worse one.
 
-        beat: the largest margin of other candidates with which it is compared; it may end early then.
+        others: candidates found before, with which it is compared; it may end early then.
         """
         ...
 
@@ -105,7 +108,8 @@ def search(
     """
     constraints, best, tried, count, interrupted = problem.constraints, None, 0, 1, False
     try:
-        starts, best_guess = _starts(problem, seed, progress)
+        starts = _starts(problem, seed, progress)
+        first, best_guess = next(starts)
         if best_guess < options.hopeless and problem.margins[0].scene.collision_world is not NOTHING:
             # A part that does not fit without obstacles does not fit with them; that search is much faster.
             alone = search(
@@ -115,13 +119,14 @@ def search(
                 return alone
             if alone.interrupted:
                 raise KeyboardInterrupt
-        count = min(len(starts), options.tried) if constraints.moves else len(starts)
+        count = options.tried if constraints.moves else len(problem.margins) * len(constraints.poses)
+        others = list[Candidate]()
         improver, gaps = SOLVERS[solver](problem, constraints.moves), fitted_gaps(problem)
-        for margins, transform in starts[:count]:
+        for (margins, transform), _ in islice(chain([(first, best_guess)], starts), count):
             if constraints.moves and tried >= options.refined and best is not None and _is_decided(best, options):
                 break
-            beat = -np.inf if best is None else best.smallest
-            found = improver.raise_margin(first_candidate(problem, margins, transform, gaps), beat=beat)
+            found = improver.raise_margin(first_candidate(problem, margins, transform, gaps), others=others)
+            others.append(found)
             best = found if best is None or found.smallest > best.smallest else best
             tried += 1
             note = f"component {best.margins.scene.branch}, best margin so far {best.smallest:.3f}"
@@ -155,10 +160,10 @@ def _is_decided(best: Candidate, options: SearchOptions) -> bool:
     return best.smallest >= NEEDED_MARGIN or best.smallest < options.beyond_reach
 
 
-def _starts(problem: PlacementProblem, seed: int, progress: Progress) -> tuple[list[Start], float]:
-    """Return the starts, and the margin of the best guess (∞ where the placements are given)."""
+def _starts(problem: PlacementProblem, seed: int, progress: Progress) -> Iterator[tuple[Start, float]]:
+    """Yield the starts, each with its margin (∞ where the placements are given), the best first."""
     if not problem.constraints.moves:
-        return [(margins, pose) for pose in problem.constraints.poses for margins in problem.margins], np.inf
+        yield from (((margins, pose), np.inf) for pose in problem.constraints.poses for margins in problem.margins)
+        return
     progress("placement", 0.0, "sampling")
-    guesses = first_guesses(problem, seed)
-    return [(guess.margins, guess.transform) for guess in guesses], max(guess.margin for guess in guesses)
+    yield from (((guess.margins, guess.transform), guess.margin) for guess in first_guesses(problem, seed))

@@ -6,6 +6,7 @@ Optimization, ch. 14: minimax). Every step is judged by the margins themselves, 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -32,9 +33,11 @@ class SequentialOptions:
     kind; all, where there are no more than twice as many. All are checked when the steps have ended. steps, rounds:
     maximum of steps, and of checks at all waypoints. tolerance: decrease of the smallest margin at all waypoints that
     calls for another round. least: smaller predicted increases, and smaller trust regions, end the steps. rough: the
-    same where candidates are compared. hope: predicted increases below the margin to beat at which steps end then.
-    radius: of the first trust region. accepted, good, very_good: ratios of actual to predicted increase from which a
-    step is taken, and the radius is kept, and doubled; else it shrinks by the factor shrink.
+    predicted increase where candidates are compared, and `astray` the tolerance then. hope: predicted increases below
+    the margin to beat at which steps end then. known_m, known_rad: from another candidate, as near steps end that do
+    not lead to more. radius: of the first trust region. accepted, good, very_good: ratios of actual to predicted
+    increase from which a step is taken, and the radius is kept, and doubled; else it shrinks by the factor shrink, from
+    the length of the step where that is less.
     """
 
     waypoints: int = 400
@@ -42,9 +45,12 @@ class SequentialOptions:
     steps: int = 60
     rounds: int = 10
     tolerance: float = 1e-4
-    least: float = 1e-5
-    rough: float = 1e-4
+    least: float = 3e-5
+    rough: float = 5e-4
+    astray: float = 2e-3
     hope: float = 12.0
+    known_m: float = 5e-3
+    known_rad: float = float(np.radians(5.0))
     radius: float = 0.5
     accepted: float = 0.05
     good: float = 0.25
@@ -65,19 +71,25 @@ class SequentialSolver:
     options: SequentialOptions = SequentialOptions()
     rows: Ints | None = None
 
-    def raise_margin(self, start: Candidate, enough: float = np.inf, beat: float | None = None) -> Candidate:
+    def raise_margin(
+        self, start: Candidate, enough: float = np.inf, others: Sequence[Candidate] | None = None
+    ) -> Candidate:
         """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one.
 
-        beat: the largest margin of other candidates. Steps then end where they lead to less, and near the optimum.
+        others: candidates with which it is compared. Steps then end where they lead to less, or to one of them, and
+        near the optimum.
         """
         best, rows = start, self._waypoints(start)
+        tolerance = self.options.tolerance if others is None else self.options.astray
+        beat = -np.inf if others is None else max((other.smallest for other in others), default=-np.inf)
+        found = best
         for _ in range(self.options.rounds):
-            found = self._optimised(best, rows, enough + self.options.tolerance, beat)
+            found = self._optimised(found, rows, enough + self.options.tolerance, others)
             values = self.problem.values(found.margins, found.transform, found.coefficients)
             smallest = float(values.min())
             if smallest > best.smallest:
                 best = Candidate(found.margins, found.transform, found.coefficients, smallest)
-            if smallest >= found.smallest - self.options.tolerance or (beat is not None and found.smallest < beat):
+            if smallest >= found.smallest - tolerance or found.smallest < beat:
                 break
             rows = np.union1d(rows, _smallest(values, self.options.lowest))
         return best
@@ -97,37 +109,56 @@ class SequentialSolver:
         spread = np.linspace(0, count - 1, most).astype(np.intp)
         return np.union1d(spread, _smallest(values, self.options.lowest))
 
-    def _optimised(self, start: Candidate, rows: Ints, enough: float, beat: float | None) -> Candidate:
+    def _optimised(self, start: Candidate, rows: Ints, enough: float, others: Sequence[Candidate] | None) -> Candidate:
         """Return the result of the trust-region method, with its smallest margin over `rows`."""
         problem, options, radius, extra, leaning = self.problem, self.options, self.options.radius, _NO_ROWS, _NO_ROWS
-        least = options.least if beat is None else options.rough
+        least = options.least if others is None else options.rough
         here = problem.values(start.margins, start.transform, start.coefficients, rows)
         best = Candidate(start.margins, start.transform, start.coefficients, float(here.min()))
         slopes = step_slopes(problem, start.margins, guides=self.guides)
-        curvature = Curvature(problem, start.margins, self.guides)
+        curvature, known = Curvature(problem, start.margins, self.guides), None
         model = self.model(best, rows, best.smallest, slopes=slopes, values=here)
         for _ in range(options.steps):
             if best.smallest >= enough:
                 break
-            step, change, predicted = curvature.best_step(model, best, radius)
-            if predicted < least or (beat is not None and best.smallest + options.hope * predicted < beat):
+            step = curvature.best_step(model, best, radius, known)
+            known, predicted = step.multipliers, step.predicted
+            if predicted < least or self._leads_to_no_more(best, predicted, others or ()):
                 break
-            coefficients, values, gain = problem.within_cone(best.coefficients + change), np.zeros((0, 1)), -np.inf
-            moved = self._moved(best, step)
+            coefficients, values, gain = problem.within_cone(best.coefficients + step.change), np.zeros((0, 1)), -np.inf
+            moved = self._moved(best, step.move)
             if moved is not None:
                 values = problem.values(*moved, coefficients, rows)
                 gain = float(values.min()) - best.smallest
-            kept = 1.0 if gain > options.good * predicted else options.shrink
-            radius *= 2.0 if gain > options.very_good * predicted else kept
+            if gain > options.very_good * predicted:
+                radius *= 2.0
+            elif gain <= options.good * predicted:
+                radius = options.shrink * min(radius, step.length)
             if moved is not None and gain > options.accepted * predicted:
                 best, here = Candidate(*moved, coefficients, float(values.min())), values
             elif radius < least:
                 break
             elif moved is not None:  # the worst margins may not have been in the model
                 extra = np.union1d(extra, valleys(values))
-                leaning = np.union1d(leaning, valleys(-problem.steepness(best.coefficients + change)[:, None]))
+                leaning = np.union1d(leaning, valleys(-problem.steepness(best.coefficients + step.change)[:, None]))
             model = self.model(best, rows, best.smallest, (extra, leaning), slopes, here)
         return best
+
+    def _leads_to_no_more(self, at: Candidate, predicted: float, others: Sequence[Candidate]) -> bool:
+        """Return whether steps from here are expected to end below another candidate, or at it."""
+        return any(
+            at.smallest + self.options.hope * predicted < other.smallest
+            or (at.smallest + predicted < other.smallest and self._is_near(at, other))
+            for other in others
+        )
+
+    def _is_near(self, at: Candidate, other: Candidate) -> bool:
+        """Return whether two candidates are placements in one branch that hardly differ."""
+        centre, options = self.problem.samples.tilt_centres.mean(axis=0), self.options
+        apart = float(np.linalg.norm(at.transform.apply(centre) - other.transform.apply(centre)))
+        cosine = 0.5 * (float(np.trace(at.transform.rotation.T @ other.transform.rotation)) - 1.0)
+        alike = at.margins.scene.branch == other.margins.scene.branch
+        return self.free and alike and apart < options.known_m and cosine > np.cos(options.known_rad)
 
     def _moved(self, at: Candidate, step: Floats) -> tuple[Margins, RigidTransform] | None:
         """Return margins and placement after a step; None where the guides cannot reach their positions."""

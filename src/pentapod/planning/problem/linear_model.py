@@ -23,8 +23,8 @@ class LinearModelOptions:
     of these leans, degrees from the lean.
     """
 
-    worst: int = 12
-    near: float = 0.4
+    worst: int = 6
+    near: float = 0.25
     steepest: int = 60
     steep: float = 0.3
     tangents_deg: tuple[float, ...] = (-36.0, -22.0, -12.0, -5.0, 0.0, 5.0, 12.0, 22.0, 36.0)
