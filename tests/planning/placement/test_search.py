@@ -11,6 +11,7 @@ from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning.limits.margins import Margins
+from pentapod.planning.placement.sampling import SamplingOptions, first_guesses
 from pentapod.planning.placement.search import SearchOptions, search
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples

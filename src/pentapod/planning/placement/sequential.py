@@ -45,7 +45,7 @@ class SequentialOptions:
     steps: int = 60
     rounds: int = 10
     tolerance: float = 1e-4
-    least: float = 3e-5
+    least: float = 1e-5
     rough: float = 5e-4
     astray: float = 2e-3
     hope: float = 12.0
