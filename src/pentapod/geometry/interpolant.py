@@ -10,7 +10,6 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.numerics.bernstein import multiply, split
-from pentapod.numerics.blocks import blocks
 
 Interpolation = Literal["linear", "cubic"]
 """How a controller moves between setpoints."""
@@ -75,9 +74,12 @@ class Interpolant:
     @cached_property
     def rates(self) -> Floats:
         """Largest |rate| (N − 1, d) on each interval, per second."""
+        if self.degree == 1:
+            return np.abs(self.steps[..., 0])
+        from pentapod.geometry.interpolant_kernels import cubic_rates  # noqa: PLC0415 - loads numba
+
         found = np.empty(self.bernstein.shape[:2])
-        for block in blocks(len(found)):
-            found[block] = _largest_rates(self._steps[block] / self.period)
+        cubic_rates(self.bernstein, self.period, found)
         return found
 
     @cached_property
@@ -102,11 +104,10 @@ class Interpolant:
         still = np.zeros((1, self.bernstein.shape[1]))
         if self.degree == 1:
             return np.diff(np.concatenate([still, self._steps[..., 0], still]), axis=0) / self.period**2
-        bends = 2.0 * np.diff(self._steps, axis=-1) / self.period**2
-        rows = np.concatenate([bends[..., 0], bends[-1:, :, 1]])
-        # The derivatives from both sides differ by rounding only: take the larger.
-        before = bends[:-1, :, 1]
-        rows[1:-1] = np.where(np.abs(before) > np.abs(rows[1:-1]), before, rows[1:-1])
+        from pentapod.geometry.interpolant_kernels import cubic_accelerations  # noqa: PLC0415 - loads numba
+
+        rows = np.empty((len(self.bernstein) + 1, self.bernstein.shape[1]))
+        cubic_accelerations(self.bernstein, self.period, rows)
         return rows
 
     @cached_property
@@ -145,22 +146,6 @@ class Interpolant:
         return self.degree * np.diff(self.bernstein, axis=-1)
 
 
-def _largest_rates(d: Floats) -> Floats:
-    """Return the largest |rate| (n, d) of polynomials with rates of these coefficients (n, d, 1 or 3)."""
-    speed = np.maximum(np.abs(d[..., 0]), np.abs(d[..., -1]))
-    if d.shape[-1] == 3:
-        # Only a rate whose middle coefficient is beyond both ends can have its maximum in between.
-        inner = np.abs(d[..., 1]) > speed
-        a, b, c = (d[..., k][inner] for k in range(3))
-        bend = a - 2.0 * b + c
-        with np.errstate(divide="ignore", invalid="ignore"):
-            t = (a - b) / bend
-        t = np.where((t > 0.0) & (t < 1.0), t, 0.0)
-        vertex = (1 - t) ** 2 * a + 2 * t * (1 - t) * b + t * t * c
-        speed[inner] = np.maximum(speed[inner], np.abs(vertex))
-    return speed
-
-
 def largest_length(vectors: Floats) -> tuple[float, int]:
     """Return the maximum of |v(t)| over M vectors of polynomials, t in [0, 1], and the index of its vector.
 
@@ -187,15 +172,10 @@ def largest_length(vectors: Floats) -> tuple[float, int]:
 
 def clamped_slopes(rows: Floats) -> Floats:
     """Return slopes (N, d), per row, of the C2 cubic spline through rows (N, d) from rest to rest."""
-    # scipy takes a while to import; programs for linear controllers never need it.
-    from scipy.linalg import solve_banded  # noqa: PLC0415
+    from pentapod.geometry.interpolant_kernels import spline_slopes  # noqa: PLC0415 - loads numba
 
-    slopes = np.zeros(rows.shape)
-    if len(rows) > 2:
-        # C2 at each inner row: the slopes before, at and after it, weighted 1, 4, 1, sum to three times the rise.
-        bands = np.ones((3, len(rows) - 2))
-        bands[1] = 4.0
-        slopes[1:-1] = solve_banded((1, 1), bands, 3.0 * (rows[2:] - rows[:-2]), check_finite=False)
+    slopes = np.empty(rows.shape)
+    spline_slopes(np.require(rows, np.float64, ["C", "W"]), slopes)
     return slopes
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Floats, Ints, row_maxima
 from pentapod.base.refusal import stage
 from pentapod.base.values import Value
 from pentapod.machine.machine import Machine
@@ -171,7 +171,7 @@ def _least_times(trajectory: Trajectory, machine: Machine, steps: Floats) -> tup
         section = np.minimum(np.searchsorted(piece.section_ends, s, side="left"), len(piece.section_ends) - 1)
         feeds = np.asarray(piece.section_feeds, dtype=np.float64)[section]
         by_feed = np.maximum(piece.feed_rate(s) / feeds, 1.0 / machine.rapid_velocity)
-        by_legs = (np.abs(piece(s, 1)) / machine.legs.max_velocity).max(axis=1)
+        by_legs = row_maxima(np.abs(piece(s, 1)) / machine.legs.max_velocity)
         slowness[rows] = np.maximum(by_feed, by_legs).reshape(-1, len(GAUSS_NODES))
         segments[rows] = np.asarray(piece.section_segments)[section.reshape(-1, len(GAUSS_NODES))[:, 1]]
     return steps * (slowness @ GAUSS_WEIGHTS), segments

@@ -11,6 +11,7 @@ from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal, stage
 from pentapod.machine.machine import Machine
+from pentapod.numerics.threads import in_threads
 from pentapod.timing.jerk.options import DEFAULTS, JerkOptions
 from pentapod.timing.limits.limit import Limit
 from pentapod.timing.limits.limits import Limits
@@ -84,11 +85,13 @@ def retime(
     _check_standing(start_speed, end_speed, dwells)
     total = sum(path.pieces[k].length for k in indices)
     profiles: list[PieceProfile] = []
-    done = 0.0
-    for k in indices:
+    slacks, done = (0.5 * velocity_margin, 0.7 * acceleration_margin), 0.0
+
+    def profile_of(k: int) -> PieceProfile | Failure:
         speeds = (start_speed if k == indices[0] else 0.0, end_speed if k == indices[-1] else 0.0)
-        slacks = (0.5 * velocity_margin, 0.7 * acceleration_margin)
-        profile = time_piece(path.pieces[k], kept, *slacks, engine, speeds)
+        return time_piece(path.pieces[k], kept, *slacks, engine, speeds)
+
+    for k, profile in zip(indices, in_threads(profile_of, indices), strict=True):
         if isinstance(profile, Failure):
             return refusal(path, k, profile)
         profiles.append(profile)

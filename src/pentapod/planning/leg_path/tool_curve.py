@@ -18,6 +18,9 @@ REORIENTATION_LEVER_M = 1e-3
 ARC_LENGTH_ERROR = 1e-7
 """Largest relative error of ds."""
 
+HALVINGS = 12
+"""How often an interval of the parameter is halved for it at most."""
+
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(6)
 
 
@@ -47,14 +50,14 @@ class ToolCurve:
         """Length in s, metres."""
         return float(self.parameter.x[-1])
 
-    @property
+    @cached_property
     def knots(self) -> Floats:
         """Stations at which the fourth derivative may jump, with both ends."""
         return self.arc_length(self.curve.x)
 
     def arc_length(self, u: Floats) -> Floats:
         """Return the station s at spline parameters u that are knots."""
-        nodes = self.parameter(self.parameter.x)
+        nodes = np.append(self.parameter.c[-1], self.curve.x[-1])
         return np.asarray(np.interp(u, nodes, self.parameter.x), dtype=np.float64)
 
     def tip_length(self, s: Floats) -> Floats:
@@ -67,11 +70,18 @@ class ToolCurve:
 
     def derivatives(self, s: Floats, order: int) -> list[tuple[Floats, Floats]]:
         """Return tip and axis (n, 3) and their derivatives with respect to s, up to `order` ≤ 3."""
-        s = np.clip(np.asarray(s, dtype=np.float64), 0.0, self.length)
-        u = np.clip(self.parameter(s), self.curve.x[0], self.curve.x[-1])
-        tip, axis = _tip_and_axis(self.curve, u, self.tilt_centre, order)
-        by_u = [self.parameter(s, k)[:, None] for k in range(1, order + 1)]
-        return list(zip(_chain(tip, by_u), _chain(axis, by_u), strict=True))
+        from pentapod.planning.leg_path.curve_kernels import poses_along  # noqa: PLC0415 - loads numba
+
+        tips, axes = (np.empty((order + 1, len(s), 3)) for _ in range(2))
+        s = np.require(s, np.float64, ["C", "W"])
+        parameter, curve = self._by_piece
+        poses_along(s, self.parameter.x, parameter, self.curve.x, curve, self.tilt_centre, tips, axes)
+        return list(zip(tips, axes, strict=True))
+
+    @cached_property
+    def _by_piece(self) -> tuple[Floats, Floats]:
+        """The coefficients of `parameter` (m, 8) and of `curve` (k, 5, 6), those of a piece side by side."""
+        return np.ascontiguousarray(self.parameter.c.T), np.ascontiguousarray(np.moveaxis(self.curve.c, 1, 0))
 
     @cached_property
     def _tip_length(self) -> CubicHermiteSpline:
@@ -83,84 +93,66 @@ class ToolCurve:
         return CubicHermiteSpline(nodes, way, np.linalg.norm(self(nodes, 1)[0], axis=1))
 
 
-def _chain(values: list[Floats], by_u: list[Floats]) -> list[Floats]:
-    """Return derivatives with respect to s from those with respect to u and the derivatives of u(s)."""
-    by_s = [
-        lambda: values[0],
-        lambda: values[1] * by_u[0],
-        lambda: values[2] * by_u[0] ** 2 + values[1] * by_u[1],
-        lambda: values[3] * by_u[0] ** 3 + 3.0 * values[2] * by_u[0] * by_u[1] + values[1] * by_u[2],
-    ]
-    return [derivative() for derivative in by_s[: len(values)]]
+def _speeds(curve: PPoly, u: Floats, tilt_centre: float, order: int) -> Floats:
+    """Return ds/du and its derivatives up to `order` ≤ 2, (order + 1, n)."""
+    from pentapod.planning.leg_path.curve_kernels import speeds_along  # noqa: PLC0415 - loads numba
 
-
-def _tip_and_axis(curve: PPoly, u: Floats, tilt_centre: float, order: int) -> tuple[list[Floats], list[Floats]]:
-    """Return tip and unit axis and their derivatives up to `order` (≤ 3) with respect to u."""
-    values = [curve(u, k) for k in range(order + 1)]
-    r = [v[:, 3:] for v in values]
-    axis = _directions(r)
-    return [v[:, :3] - tilt_centre * a for v, a in zip(values, axis, strict=True)], axis
-
-
-def _directions(r: list[Floats]) -> list[Floats]:
-    """Return the unit vectors a = r/n of vectors r[0] (n, 3), and their derivatives from those of r (up to r[3]).
-
-    From a n = r and n² = r · r, differentiated as often as needed.
-    """
-    n = np.linalg.norm(r[0], axis=1, keepdims=True)
-    a = [r[0] / n]
-    if len(r) == 1:
-        return a
-    n1 = _dot(a[0], r[1])
-    a.append((r[1] - n1 * a[0]) / n)
-    if len(r) == 2:
-        return a
-    n2 = (_dot(r[1], r[1]) + _dot(r[0], r[2]) - n1 * n1) / n
-    a.append((r[2] - 2.0 * n1 * a[1] - n2 * a[0]) / n)
-    if len(r) == 3:
-        return a
-    n3 = (3.0 * _dot(r[1], r[2]) + _dot(r[0], r[3]) - 3.0 * n1 * n2) / n
-    a.append((r[3] - 3.0 * n1 * a[2] - 3.0 * n2 * a[1] - n3 * a[0]) / n)
-    return a
-
-
-def _speed(curve: PPoly, u: Floats, tilt_centre: float, order: int) -> list[Floats]:
-    """Return ds/du and its derivatives up to `order` (≤ 2) with respect to u."""
-    tip, axis = _tip_and_axis(curve, u, tilt_centre, order + 1)
-
-    def product(j: int, k: int) -> Floats:
-        return (_dot(tip[j], tip[k]) + REORIENTATION_LEVER_M**2 * _dot(axis[j], axis[k]))[:, 0]
-
-    speeds = [np.sqrt(product(1, 1))]
-    if order >= 1:
-        speeds.append(product(1, 2) / speeds[0])
-    if order >= 2:
-        speeds.append((product(2, 2) + product(1, 3) - speeds[1] ** 2) / speeds[0])
+    speeds = np.empty((order + 1, len(u)))
+    speeds_along(
+        u, curve.x, np.ascontiguousarray(np.moveaxis(curve.c, 1, 0)), tilt_centre, REORIENTATION_LEVER_M, speeds
+    )
     return speeds
 
 
 def _parameter_over_length(curve: PPoly, tilt_centre: float) -> PPoly:
     """Return u(s): pieces of degree 7, exact u, u′, u″, u‴ at nodes dense enough for ARC_LENGTH_ERROR."""
-    nodes = curve.x
-    slowest = float(_speed(curve, nodes, tilt_centre, 0)[0].min())
-    if slowest < 1e-6:
+    nodes, inverse = curve.x, _inverse(curve, curve.x, tilt_centre)
+    if 1.0 / float(inverse[1].max()) < 1e-6:
         what = "the tool stands still somewhere on the path"
         raise ToolpathError(what, expected="a motion of tip or axis between waypoints")
-    error = np.ones(1)
-    for _ in range(12):
-        widths = np.diff(nodes)
-        at = nodes[:-1, None] + 0.5 * widths[:, None] * (1.0 + _GAUSS_X)
-        lengths = 0.5 * widths * (_speed(curve, at.ravel(), tilt_centre, 0)[0].reshape(at.shape) @ _GAUSS_W)
-        s = np.concatenate([[0.0], np.cumsum(lengths)])
-        v, v1, v2 = _speed(curve, nodes, tilt_centre, 2)
-        u_of_s = _septic(s, [nodes, 1.0 / v, -v1 / v**3, (3.0 * v1**2 - v * v2) / v**5.0])
-        between = (s[:-1, None] + np.diff(s)[:, None] * np.array([0.25, 0.5, 0.75])).ravel()
-        relative = np.abs(u_of_s(between, 1) * _speed(curve, u_of_s(between), tilt_centre, 0)[0] - 1.0)
-        error = relative.reshape(-1, 3).max(axis=1)
-        if error.max() <= ARC_LENGTH_ERROR:
-            return u_of_s
-        nodes = np.sort(np.concatenate([nodes, 0.5 * (nodes[:-1] + nodes[1:])[error > ARC_LENGTH_ERROR]]))
+    lengths = _lengths(curve, nodes[:-1], nodes[1:], tilt_centre)
+    unknown, error = np.arange(len(lengths)), np.ones(0)
+    for _ in range(HALVINGS):
+        powers = _septic(lengths[unknown], inverse[:, unknown], inverse[:, unknown + 1])
+        error = _error(curve, powers, lengths[unknown], tilt_centre)
+        coarse = unknown[error > ARC_LENGTH_ERROR]
+        if not len(coarse):
+            powers = _septic(lengths, inverse[:, :-1], inverse[:, 1:])
+            return PPoly(powers[::-1], np.concatenate([[0.0], np.cumsum(lengths)]))
+        middles = 0.5 * (nodes[coarse] + nodes[coarse + 1])
+        early = _lengths(curve, nodes[coarse], middles, tilt_centre)
+        late = _lengths(curve, middles, nodes[coarse + 1], tilt_centre)
+        nodes = np.insert(nodes, coarse + 1, middles)
+        inverse = np.insert(inverse, coarse + 1, _inverse(curve, middles, tilt_centre), axis=1)
+        lengths[coarse] = early
+        lengths = np.insert(lengths, coarse + 1, late)
+        first = coarse + np.arange(len(coarse))
+        unknown = np.sort(np.concatenate([first, first + 1]))
     raise ToolpathError("the path bends too sharply to measure its length", value=float(error.max()))
+
+
+def _inverse(curve: PPoly, u: Floats, tilt_centre: float) -> Floats:
+    """Return u and its derivatives with respect to s, up to the third, (4, n)."""
+    v, v1, v2 = _speeds(curve, u, tilt_centre, 2)
+    return np.stack([u, 1.0 / v, -v1 / v**3, (3.0 * v1**2 - v * v2) / v**5.0])
+
+
+def _lengths(curve: PPoly, begins: Floats, ends: Floats, tilt_centre: float) -> Floats:
+    """Return the lengths (n,) in s of intervals of u, m."""
+    half = 0.5 * (ends - begins)
+    at = begins[:, None] + half[:, None] * (1.0 + _GAUSS_X)
+    return half * (_speeds(curve, at.ravel(), tilt_centre, 0)[0].reshape(at.shape) @ _GAUSS_W)
+
+
+def _error(curve: PPoly, powers: Floats, lengths: Floats, tilt_centre: float) -> Floats:
+    """Return the largest relative error (n,) of ds between nodes, of polynomials u(s) with these powers (8, n)."""
+    largest = np.zeros(len(lengths))
+    for fraction in (0.25, 0.5, 0.75):
+        u, rate = powers[-1], np.zeros(len(lengths))
+        for power in powers[-2::-1]:
+            rate, u = rate * (fraction * lengths) + u, u * (fraction * lengths) + power
+        largest = np.maximum(largest, np.abs(rate * _speeds(curve, u, tilt_centre, 0)[0] - 1.0))
+    return largest
 
 
 _SEPTIC = np.array(
@@ -169,18 +161,12 @@ _SEPTIC = np.array(
 """Coefficients of τ⁴ to τ⁷ from the errors at τ = 1, in value and 3 derivatives, of the cubic from the left end."""
 
 
-def _septic(x: Floats, y: list[Floats]) -> PPoly:
-    """Return the C3 piecewise polynomial of degree 7 with value and 3 derivatives y (4 of (n,)) at x (n,)."""
-    h = np.diff(x)
+def _septic(h: Floats, left: Floats, right: Floats) -> Floats:
+    """Return the powers (8, n) of polynomials of degree 7 with values and 3 derivatives (4, n) at 0 and h (n,)."""
     scale = np.array([h**k for k in range(4)])
-    a = np.array([value[:-1] for value in y]) * scale
+    a = left * scale
     a[2], a[3] = a[2] / 2.0, a[3] / 6.0
-    errors = np.array([value[1:] for value in y]) * scale - np.array(
+    errors = right * scale - np.array(
         [a[0] + a[1] + a[2] + a[3], a[1] + 2.0 * a[2] + 3.0 * a[3], 2.0 * a[2] + 6.0 * a[3], 6.0 * a[3]]
     )
-    powers = np.concatenate([a, _SEPTIC @ errors]) / np.array([h**k for k in range(8)])
-    return PPoly(powers[::-1], x)
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.einsum("ni,ni->n", a, b)[:, None]
+    return np.concatenate([a, _SEPTIC @ errors]) / np.array([h**k for k in range(8)])

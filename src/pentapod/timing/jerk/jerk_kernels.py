@@ -14,6 +14,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.numerics.kernels import kernel
+from pentapod.timing.jerk.row_kernels import Rows, gathered
 from pentapod.timing.jerk.spline_kernels import (
     BEND_BEND,
     add_gradient,
@@ -23,23 +24,12 @@ from pentapod.timing.jerk.spline_kernels import (
     spline_values,
 )
 
-LEAST_SHARE = 1e-9
-"""x is held above this share of x_k."""
-
 LARGEST_RESIDUAL = 1e-7
 """Residual of a row below which the method may stop."""
 
 
-class JerkRows(NamedTuple):
-    """Rows ±p·v + lean x ≤ bound: p (N, P, 3), lean (N, P), bound (N, P, 2)."""
-
-    p: Floats
-    lean: Floats
-    bound: Floats
-
-
 class Iterate(NamedTuple):
-    """Slacks s and multipliers z (N, P, 2); off: residuals of the rows, then Δs; rest: of complementarity, then Δz."""
+    """Slacks s and multipliers z (M, 2); off: residuals of the rows, then Δs; rest: of complementarity, then Δz."""
 
     s: Floats
     z: Floats
@@ -48,40 +38,18 @@ class Iterate(NamedTuple):
 
 
 @kernel
-def _rows(a0: Floats, a1: Floats, c: Floats, varies: int, jerks: Floats, x_k: Floats, top: Floats) -> JerkRows:
-    """Return all rows; arguments as for `minimise_duration`."""
-    count, rows = a0.shape
-    more = jerks.shape[1]
-    pairs = rows + more + 1
-    p, lean, bound = np.empty((count, pairs, 3)), np.empty((count, pairs)), np.empty((count, pairs, 2))
-    for i in range(count):
-        for j in range(rows):
-            p[i, j, 0], p[i, j, 1], p[i, j, 2], lean[i, j] = a0[i, j], a1[i, j], 0.0, 0.0
-            bound[i, j, 0], bound[i, j, 1] = 1.0 + c[i * varies, j], 1.0 - c[i * varies, j]
-        root = np.sqrt(x_k[i])
-        for j in range(rows, rows + more):
-            for d in range(3):
-                p[i, j, d] = root * jerks[i, j - rows, d]
-            lean[i, j] = 0.5 / x_k[i]
-            bound[i, j, 0], bound[i, j, 1] = 1.5, 1.5
-        j = rows + more
-        p[i, j, 0], p[i, j, 1], p[i, j, 2], lean[i, j] = 1.0 / top[i], 0.0, 0.0, 0.0
-        bound[i, j, 0], bound[i, j, 1] = 1.0, -LEAST_SHARE * x_k[i] / top[i]
-    return JerkRows(p, lean, bound)
-
-
-@kernel
-def _start(rows: JerkRows, v: Floats, level: float) -> Iterate:
-    """Return slacks and multipliers to start from, on a level, and room for the rest."""
-    p, lean, bound = rows
+def _start(rows: Rows, v: Floats, level: float, index: Ints, multipliers: Floats) -> Iterate:
+    """Return slacks and multipliers to start from: those given (N, P, 2), where they are above the level."""
+    p, lean, bound, start = rows
     s, z, off, rest = np.empty_like(bound), np.empty_like(bound), np.empty_like(bound), np.empty_like(bound)
     for i in range(len(v)):
-        for j in range(p.shape[1]):
-            q = p[i, j, 0] * v[i, 0] + p[i, j, 1] * v[i, 1] + p[i, j, 2] * v[i, 2]
-            e = lean[i, j] * v[i, 0]
-            s[i, j, 0] = max(bound[i, j, 0] - q - e, level)
-            s[i, j, 1] = max(bound[i, j, 1] + q - e, level)
-            z[i, j, 0], z[i, j, 1] = level * 0.1 / s[i, j, 0], level * 0.1 / s[i, j, 1]
+        for m in range(start[i], start[i + 1]):
+            q = p[m, 0] * v[i, 0] + p[m, 1] * v[i, 1] + p[m, 2] * v[i, 2]
+            e = lean[m] * v[i, 0]
+            s[m, 0] = max(bound[m, 0] - q - e, level)
+            s[m, 1] = max(bound[m, 1] + q - e, level)
+            for side in range(2):
+                z[m, side] = max(multipliers[i, index[m], side], level * 0.1 / s[m, side])
     return Iterate(s, z, off, rest)
 
 
@@ -89,7 +57,7 @@ def _start(rows: JerkRows, v: Floats, level: float) -> Iterate:
 def _assemble(
     basis: Floats,
     first: Ints,
-    rows: JerkRows,
+    rows: Rows,
     weight: Floats,
     x_k: Floats,
     v: Floats,
@@ -102,41 +70,42 @@ def _assemble(
 
     Returns Σ s z, the objective and the largest residual.
     """
-    p, lean, bound = rows
+    p, lean, bound, start = rows
     s, z, off, _ = iterate
     band[:], right[:], down[:] = 0.0, 0.0, 0.0
     g, g2, h = np.empty(3), np.empty(3), np.empty(6)
     total, largest, objective = 0.0, 0.0, 0.0
     for i in range(len(first)):
-        x = max(v[i, 0], 1e-6 * x_k[i])
+        v0, v1, v2 = v[i, 0], v[i, 1], v[i, 2]
+        x = max(v0, 1e-6 * x_k[i])
         power = weight[i] / (x * np.sqrt(x))
         objective += power * x
         g[0], g[1], g[2] = -0.5 * power, 0.0, 0.0
         g2[:], h[:] = 0.0, 0.0
         h[0] = 0.75 * power / x
-        for j in range(p.shape[1]):
-            q = p[i, j, 0] * v[i, 0] + p[i, j, 1] * v[i, 1] + p[i, j, 2] * v[i, 2]
-            e = lean[i, j] * v[i, 0]
-            sign = 1.0
-            for side in range(2):
-                p0, p1, p2 = sign * p[i, j, 0] + lean[i, j], sign * p[i, j, 1], sign * p[i, j, 2]
-                si, zi = s[i, j, side], z[i, j, side]
-                rp = sign * q + e + si - bound[i, j, side]
-                off[i, j, side] = rp
-                largest = max(largest, abs(rp))
-                total += si * zi
-                w = zi / si
-                t = w * rp - zi
-                g[0], g[1], g[2] = g[0] + zi * p0, g[1] + zi * p1, g[2] + zi * p2
-                g2[0], g2[1], g2[2] = g2[0] + t * p0, g2[1] + t * p1, g2[2] + t * p2
-                w0, w1 = w * p0, w * p1
-                h[0] += w0 * p0
-                h[1] += w0 * p1
-                h[2] += w0 * p2
-                h[3] += w1 * p1
-                h[4] += w1 * p2
-                h[BEND_BEND] += w * p2 * p2
-                sign = -1.0
+        for m in range(start[i], start[i + 1]):
+            p0, p1, p2, e = p[m, 0], p[m, 1], p[m, 2], lean[m]
+            q, s0, s1, z0, z1 = p0 * v0 + p1 * v1 + p2 * v2, s[m, 0], s[m, 1], z[m, 0], z[m, 1]
+            off0, off1 = q + e * v0 + s0 - bound[m, 0], e * v0 - q + s1 - bound[m, 1]
+            off[m, 0], off[m, 1] = off0, off1
+            largest = max(largest, abs(off0), abs(off1))
+            total += s0 * z0 + s1 * z1
+            w0, w1 = z0 / s0, z1 / s1
+            t0, t1 = w0 * off0 - z0, w1 * off1 - z1
+            up, low = e + p0, e - p0
+            g[0] += z0 * up + z1 * low
+            g[1] += (z0 - z1) * p1
+            g[2] += (z0 - z1) * p2
+            g2[0] += t0 * up + t1 * low
+            g2[1] += (t0 - t1) * p1
+            g2[2] += (t0 - t1) * p2
+            both, across = w0 + w1, w0 * up - w1 * low
+            h[0] += w0 * up * up + w1 * low * low
+            h[1] += across * p1
+            h[2] += across * p2
+            h[3] += both * p1 * p1
+            h[4] += both * p1 * p2
+            h[BEND_BEND] += both * p2 * p2
         add_gradient(basis, i, g, first[i], right)
         add_gradient(basis, i, g2, first[i], down)
         add_hessian(basis, i, h, first[i], band)
@@ -159,19 +128,19 @@ def _fix(band: Floats, fixed: Ints) -> None:
 
 
 @kernel
-def _predict(rows: JerkRows, dv: Floats, iterate: Iterate) -> tuple[float, float]:
+def _predict(rows: Rows, dv: Floats, iterate: Iterate) -> tuple[float, float]:
     """Fill Δs Δz of the step to the boundary; return Σ s z now and after that step."""
-    p, lean, _ = rows
+    p, lean, _, start = rows
     s, z, off, product = iterate
     primal, dual = 1.0, 1.0
     sz, szd, sdz, dd = 0.0, 0.0, 0.0, 0.0
     for i in range(len(dv)):
-        for j in range(p.shape[1]):
-            q = p[i, j, 0] * dv[i, 0] + p[i, j, 1] * dv[i, 1] + p[i, j, 2] * dv[i, 2]
-            e = lean[i, j] * dv[i, 0]
+        for m in range(start[i], start[i + 1]):
+            q = p[m, 0] * dv[i, 0] + p[m, 1] * dv[i, 1] + p[m, 2] * dv[i, 2]
+            e = lean[m] * dv[i, 0]
             for side in range(2):
-                si, zi = s[i, j, side], z[i, j, side]
-                d = -off[i, j, side] - q - e
+                si, zi = s[m, side], z[m, side]
+                d = -off[m, side] - q - e
                 ratio = d / si
                 f = -zi - zi * ratio
                 if ratio * primal < -1.0:
@@ -182,53 +151,53 @@ def _predict(rows: JerkRows, dv: Floats, iterate: Iterate) -> tuple[float, float
                 szd += zi * d
                 sdz += si * f
                 dd += d * f
-                product[i, j, side] = d * f
+                product[m, side] = d * f
                 q = -q
     return sz, max(sz + primal * szd + dual * sdz + primal * dual * dd, 0.0)
 
 
 @kernel
-def _correct(basis: Floats, first: Ints, rows: JerkRows, iterate: Iterate, aim: float, down: Floats) -> None:
+def _correct(basis: Floats, first: Ints, rows: Rows, iterate: Iterate, aim: float, down: Floats) -> None:
     """Fill the corrector's `down`, and the complementarity residual s z − aim + Δs Δz."""
-    p, lean, _ = rows
+    p, lean, _, start = rows
     s, z, off, product = iterate
     down[:] = 0.0
     g = np.empty(3)
     for i in range(len(first)):
         g[:] = 0.0
-        for j in range(p.shape[1]):
+        for m in range(start[i], start[i + 1]):
             sign = 1.0
             for side in range(2):
-                si, zi = s[i, j, side], z[i, j, side]
-                rest = si * zi - aim + product[i, j, side]
-                product[i, j, side] = rest
-                t = (zi * off[i, j, side] - rest) / si
-                g[0] += t * (sign * p[i, j, 0] + lean[i, j])
-                g[1] += t * sign * p[i, j, 1]
-                g[2] += t * sign * p[i, j, 2]
+                si, zi = s[m, side], z[m, side]
+                rest = si * zi - aim + product[m, side]
+                product[m, side] = rest
+                t = (zi * off[m, side] - rest) / si
+                g[0] += t * (sign * p[m, 0] + lean[m])
+                g[1] += t * sign * p[m, 1]
+                g[2] += t * sign * p[m, 2]
                 sign = -1.0
         add_gradient(basis, i, g, first[i], down)
 
 
 @kernel
-def _step(rows: JerkRows, dv: Floats, iterate: Iterate) -> tuple[float, float]:
+def _step(rows: Rows, dv: Floats, iterate: Iterate) -> tuple[float, float]:
     """Turn the residuals into Δs and Δz; return how far each may go."""
-    p, lean, _ = rows
+    p, lean, _, start = rows
     s, z, off, rest = iterate
     primal, dual = 1e300, 1e300
     for i in range(len(dv)):
-        for j in range(p.shape[1]):
-            q = p[i, j, 0] * dv[i, 0] + p[i, j, 1] * dv[i, 1] + p[i, j, 2] * dv[i, 2]
-            e = lean[i, j] * dv[i, 0]
+        for m in range(start[i], start[i + 1]):
+            q = p[m, 0] * dv[i, 0] + p[m, 1] * dv[i, 1] + p[m, 2] * dv[i, 2]
+            e = lean[m] * dv[i, 0]
             for side in range(2):
-                si, zi = s[i, j, side], z[i, j, side]
-                d = -off[i, j, side] - q - e
-                f = (-rest[i, j, side] - zi * d) / si
+                si, zi = s[m, side], z[m, side]
+                d = -off[m, side] - q - e
+                f = (-rest[m, side] - zi * d) / si
                 if d < 0.0 and -si > primal * d:
                     primal = -si / d
                 if f < 0.0 and -zi > dual * f:
                     dual = -zi / f
-                off[i, j, side], rest[i, j, side] = d, f
+                off[m, side], rest[m, side] = d, f
                 q = -q
     return min(1.0, 0.99 * primal), min(1.0, 0.99 * dual)
 
@@ -250,6 +219,8 @@ def minimise_duration(
     c: Floats,
     varies: int,
     jerks: Floats,
+    index: Ints,
+    start: Ints,
     x_k: Floats,
     top: Floats,
     weight: Floats,
@@ -258,27 +229,28 @@ def minimise_duration(
     iterations: int,
     tolerance: float,
     y: Floats,
+    multipliers: Floats,
 ) -> tuple[bool, float, float]:
     """Improve the coefficients y (n,) in their place; those marked 1 in `fixed` (n,) stay.
 
-    a0, a1 (N, R): A₀ and A₁; c (N, R), or (1, R) where `varies` is 0; jerks (N, K, 3): J₀, J₁, J₂; x_k, top, weight
-    (N,). level: where slacks and multipliers start. Returns whether the method converged, the duality gap over the
-    objective, and the largest residual of a row.
+    a0, a1 (N, R): A₀ and A₁; c (N, R), or (1, R) where `varies` is 0; jerks (N, K, 3): J₀, J₁, J₂; index, start: the
+    rows that can bind; x_k, top, weight (N,). level: where slacks and multipliers start; multipliers (N, R + K + 1, 2):
+    those of a solve before, where they are above it; those of this one replace them. Returns whether the method
+    converged, the duality gap over the objective, and the largest residual of a row.
     """
     count, n = len(first), len(y)
     v, dv, band = np.empty((count, 3)), np.empty((count, 3)), np.empty((n, 4))
     right, down, step = np.empty(n), np.empty(n), np.empty(n)
-    rows = _rows(a0, a1, c, varies, jerks, x_k, top)
+    rows = gathered(a0, a1, c, varies, jerks, x_k, top, index, start)
     spline_values(basis, first, y, v)
-    iterate = _start(rows, v, level)
+    iterate = _start(rows, v, level, index, multipliers)
     s, z, off, rest = iterate
-    gap, residual = np.inf, np.inf
+    gap, residual, converged = np.inf, np.inf, False
     for _ in range(iterations):
         total, objective, residual = _assemble(basis, first, rows, weight, x_k, v, iterate, band, right, down)
         gap = total / objective
-        if gap < tolerance and residual < LARGEST_RESIDUAL:
-            return True, gap, residual
-        if not np.isfinite(gap):
+        converged = bool(gap < tolerance and residual < LARGEST_RESIDUAL)
+        if converged or not np.isfinite(gap):
             break
         _fix(band, fixed)
         factor_banded(band, n)
@@ -290,11 +262,13 @@ def minimise_duration(
         _newton(band, right, down, fixed, step)
         spline_values(basis, first, step, dv)
         primal, dual = _step(rows, dv, iterate)
-        for i in range(count):
-            for j in range(s.shape[1]):
-                for side in range(2):
-                    s[i, j, side] += primal * off[i, j, side]
-                    z[i, j, side] += dual * rest[i, j, side]
+        for m in range(len(s)):
+            for side in range(2):
+                s[m, side] += primal * off[m, side]
+                z[m, side] += dual * rest[m, side]
         y += primal * step
         spline_values(basis, first, y, v)
-    return False, gap, residual
+    for i in range(count):
+        for m in range(start[i], start[i + 1]):
+            multipliers[i, index[m], 0], multipliers[i, index[m], 1] = z[m, 0], z[m, 1]
+    return converged, gap, residual

@@ -133,7 +133,7 @@ class JerkProblem:
         if self.measure is not None:
             answer, longer, exceeds = tightened(*answer, partial(_measured, self.measure, shift))
         problem, y = answer
-        return BlockLaw(replace(problem, rows=NO_ROWS), y, shift, longer, exceeds)
+        return BlockLaw(replace(problem, rows=NO_ROWS, multipliers=NO_ROWS.jerks), y, shift, longer, exceeds)
 
     def joined(self, overlap: int, laws: list[BlockLaw]) -> SpeedNodes | None:
         """Return the law of the blocks' laws, None where two do not agree."""

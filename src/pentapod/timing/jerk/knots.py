@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from pentapod.base.arrays import Bools, Floats
+from pentapod.base.arrays import Bools, Floats, row_maxima
 from pentapod.timing.jerk.interval import Interval
 from pentapod.timing.jerk.rows import JerkRows
 from pentapod.timing.limits.limit import share_of_room
@@ -22,7 +22,7 @@ def place_knots(interval: Interval, x: Floats, acceleration: float, share: float
     steady = _steady(x, rows, options.steady_share)
     # Where the path's own jerk holds the law far below x, knots are close in the time that it takes there.
     with np.errstate(divide="ignore"):
-        x = np.minimum(x, np.abs(rows.jerks[:, :, 0]).max(axis=1) ** (-2.0 / 3.0))
+        x = np.minimum(x, row_maxima(np.abs(rows.jerks[:, :, 0])) ** (-2.0 / 3.0))
     speed = np.sqrt(x)
     steps = 2.0 * np.diff(s) / (speed[:-1] + speed[1:])
     times = np.concatenate([[0.0], np.cumsum(steps)])
@@ -46,14 +46,14 @@ def place_knots(interval: Interval, x: Floats, acceleration: float, share: float
 def _ramp_time(rows: JerkRows) -> float:
     """Return the median time in seconds in which the jerk limit brings an acceleration to its limit."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        ramps = 2.0 * np.abs(rows.jerks[:, :, 2]).max(axis=1) / np.abs(rows.first).max(axis=1)
+        ramps = 2.0 * row_maxima(np.abs(rows.jerks[:, :, 2])) / row_maxima(np.abs(rows.first))
     return float(np.median(ramps[np.isfinite(ramps) & (ramps > 0.0)]))
 
 
 def _active_kinks(interval: Interval, x: Floats, times: Floats) -> Floats:
     """Return the kinks where the path's curvature takes part of a limit at the law x, no closer than the least step."""
     rows, options = interval.rows, interval.options.knots
-    use = np.maximum(np.abs(rows.jerks[:, :, 0]).max(axis=1) * x**1.5, np.abs(rows.second).max(axis=1) * x)
+    use = np.maximum(row_maxima(np.abs(rows.jerks[:, :, 0])) * x**1.5, row_maxima(np.abs(rows.second)) * x)
     use = maximum_filter1d(use, 2 * options.kink_reach + 1)
     kinks = interval.kinks[np.interp(interval.kinks, interval.s, use) > options.kink_share]
     if interval.least_step <= 0.0 or not len(kinks):
@@ -91,8 +91,8 @@ def _steady(x: Floats, rows: JerkRows, share: float) -> Bools:
     """Return at which gridpoints (N,) the law x keeps its speed and uses less than a share of the other limits."""
     constant = np.abs(np.diff(x)) <= 1e-6 * x[:-1]
     use = np.maximum(
-        share_of_room(rows.second * x[:, None], rows.offset).max(axis=1),
-        np.abs(rows.jerks[:, :, 0]).max(axis=1) * x**1.5,
+        row_maxima(share_of_room(rows.second * x[:, None], rows.offset)),
+        row_maxima(np.abs(rows.jerks[:, :, 0])) * x**1.5,
     )
     return np.append(constant, False) & np.append(False, constant) & (use < share)
 

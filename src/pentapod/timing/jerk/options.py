@@ -45,6 +45,7 @@ class SolverOptions(Value):
     seam_overlap: int = 64  # coefficients on either side of a seam, beyond which the law no longer depends on it
     cold_levels: tuple[float, ...] = (1.0, 0.1)  # slacks and multipliers tried as a start in the first pass
     warm_levels: tuple[float, ...] = (0.01, 0.1, 1.0)  # likewise where the start is nearly optimal
+    known_level: float = 1e-3  # likewise where multipliers of a solve before are known; they count above it
     iterations: int = 60  # largest number of Newton steps
     gap: float = 1e-5  # duality gap, as a share of the objective, at which the method stops
     accepted_gap: float = 1e-3  # gap that is accepted where it does not get there

@@ -31,7 +31,7 @@ def _with_ramps(interval: Interval) -> Answer | None:
     else:
         coarse, x = problem, _law_at_stations(interval, problem, rough)
         used = float(coarse.rows.acceleration_shares(coarse.values(rough)).max())
-        problem = Subproblem.on(interval, place_knots(interval, x, min(1.0, options.knots.spare * used)))
+        problem = Subproblem.on(interval, place_knots(interval, x, min(1.0, options.knots.spare * used)), rough=coarse)
         y, x_k = _transferred(coarse, rough, problem)
     better = _converged(problem, y, x_k, options.passes)
     if better is None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Floats, row_maxima
 from pentapod.timing.limits.limit import share_of_room
 from pentapod.timing.time_law.motion_law import SpeedNodes
 
@@ -27,11 +27,11 @@ class JerkRows:
 
     def acceleration_shares(self, v: Floats) -> Floats:
         """Return the largest share (N,) of an acceleration limit at x, x′, x″ (N, 3), beside the offset."""
-        return share_of_room(self.first * (0.5 * v[:, 1:2]) + self.second * v[:, :1], self.offset).max(axis=1)
+        return row_maxima(share_of_room(self.first * (0.5 * v[:, 1:2]) + self.second * v[:, :1], self.offset))
 
     def jerk_shares(self, v: Floats) -> Floats:
         """Return the largest share (N,) of a jerk limit at x, x′, x″ (N, 3)."""
-        return np.abs(np.einsum("nkd,nd->nk", self.jerks, v)).max(axis=1) * np.sqrt(np.maximum(v[:, 0], 0.0))
+        return row_maxima(np.abs(np.einsum("nkd,nd->nk", self.jerks, v))) * np.sqrt(np.maximum(v[:, 0], 0.0))
 
 
 _NONE = np.zeros((0, 0))

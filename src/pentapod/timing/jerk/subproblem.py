@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +13,7 @@ from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.timing.jerk.interval import End, Interval
 from pentapod.timing.jerk.jerk_kernels import minimise_duration
 from pentapod.timing.jerk.options import JerkOptions
+from pentapod.timing.jerk.row_kernels import binding_rows
 from pentapod.timing.jerk.rows import ROW_NAMES, JerkRows
 from pentapod.timing.jerk.spline_kernels import cubic_basis, spline_values
 from pentapod.timing.time_law.motion_law import SpeedNodes
@@ -22,7 +24,8 @@ class Subproblem:
     """Spline, rows and end conditions of one interval.
 
     s (N,): gridpoints; knots (K + 6,); basis (N, 3, 4), first (N,): B-splines at gridpoints; top (N,): upper bound of
-    x; ramps (N,): bound by the ramps at the ends; weight (N,): of 1/√x in the objective.
+    x; ramps (N,): bound by the ramps at the ends; weight (N,): of 1/√x in the objective. multipliers (N, P, 2): of all
+    rows, from the last solve, 0 where there was none; each solve replaces its own, and starts from them.
     """
 
     s: Floats
@@ -33,14 +36,20 @@ class Subproblem:
     top: Floats
     ramps: Floats
     weight: Floats
+    multipliers: Floats
     begin: End
     end: End
     length: float
     options: JerkOptions
 
     @classmethod
-    def on(cls, interval: Interval, inner: Floats, before: Subproblem | None = None) -> Subproblem:
-        """Return the problem with inner knots (K,); rows of gridpoints that `before` has are taken from there."""
+    def on(
+        cls, interval: Interval, inner: Floats, before: Subproblem | None = None, rough: Subproblem | None = None
+    ) -> Subproblem:
+        """Return the problem with inner knots (K,); rows of gridpoints that `before` has are taken from there.
+
+        rough: a problem from whose multipliers it starts, where there is none before.
+        """
         each = interval.options.solver.gridpoints_per_knot
         steps = np.diff(inner)[:, None] * (np.arange(each) / each)
         grid = np.append((inner[:-1, None] + steps).ravel(), inner[-1])
@@ -52,8 +61,18 @@ class Subproblem:
         ramps = np.minimum(interval.begin.bound(grid), interval.end.bound(interval.length - grid))
         weight = np.gradient(grid)
         weight *= len(grid) / (weight / np.sqrt(np.minimum(top, ramps))).sum()
+        multipliers = _multipliers(grid, rows, before or rough)
         ends = interval.begin, interval.end, interval.length
-        return cls(grid, knots, basis, first, rows, top, ramps, weight, *ends, interval.options)
+        return cls(grid, knots, basis, first, rows, top, ramps, weight, multipliers, *ends, interval.options)
+
+    @cached_property
+    def binding(self) -> tuple[Ints, Ints]:
+        """The numbers of the rows that can bind (M,), and where those of each gridpoint begin (N + 1,)."""
+        count = self.multipliers.shape[0] * self.multipliers.shape[1]
+        index, start = np.empty(count, dtype=np.int64), np.empty(len(self.s) + 1, dtype=np.int64)
+        rows, varies = self.rows, int(len(self.rows.offset) > 1)
+        size = binding_rows(rows.second, 0.5 * rows.first, -rows.offset, varies, rows.jerks, self.top, index, start)
+        return index[:size].copy(), start
 
     @property
     def inner(self) -> Floats:
@@ -129,19 +148,28 @@ class Subproblem:
 
         inside: how many coefficients stay at an end of this window that is no end of the interval.
         """
-        levels = self.options.solver.cold_levels if number == 0 else self.options.solver.warm_levels
+        options = self.options.solver
+        levels = options.cold_levels if number == 0 else options.warm_levels
         fixed = self.fixed[0] if low == 0 else inside[0], self.fixed[1] if high == len(y) else inside[1]
-        answers = (self._solved(y, x_k, level, low, high, fixed) for level in levels)
+        known = self.multipliers[self.gridpoints(low, high), -1, 0]
+        starts = ((options.known_level, True), *((level, False) for level in levels))
+        answers = (self._solved(y, x_k, *start, low, high, fixed) for start in starts[0 if known.all() else 1 :])
         return next((answer for answer in answers if answer is not None), None)
 
     def _solved(
-        self, y: Floats, x_k: Floats, level: float, low: int, high: int, ends: tuple[int, int]
+        self, y: Floats, x_k: Floats, level: float, known: bool, low: int, high: int, ends: tuple[int, int]
     ) -> Floats | None:
+        """Return y with the coefficients from low to before high optimised, from slacks and multipliers on a level.
+
+        known: whether multipliers of the last solve count where they are above it.
+        """
         here, options = self.gridpoints(low, high), self.options.solver
         fixed = np.zeros(high - low, dtype=np.int64)
         fixed[: ends[0]] = 1
         fixed[len(fixed) - ends[1] :] = 1
-        rows, part = self.rows, y[low:high].copy()
+        rows, part, (index, start) = self.rows, y[low:high].copy(), self.binding
+        begin, end = int(start[here.start]), int(start[here.stop])
+        multipliers = self.multipliers[here].copy() if known else np.zeros_like(self.multipliers[here])
         varies = int(len(rows.offset) > 1)
         converged, gap, residual = minimise_duration(
             self.basis[here],
@@ -151,6 +179,8 @@ class Subproblem:
             -rows.offset[here] if varies else -rows.offset,
             varies,
             rows.jerks[here],
+            index[begin:end],
+            start[here.start : here.stop + 1] - begin,
             x_k[here],
             self.top[here],
             self.weight[here],
@@ -159,9 +189,11 @@ class Subproblem:
             options.iterations,
             options.gap,
             part,
+            multipliers,
         )
         if not (residual < options.accepted_residual and (converged or gap < options.accepted_gap)):
             return None
+        self.multipliers[here] = multipliers
         y = y.copy() if high - low < len(y) else part
         y[low:high] = part
         return y
@@ -207,6 +239,13 @@ class Subproblem:
 
 Answer = tuple[Subproblem, Floats]
 """A subproblem and the coefficients that solve it."""
+
+
+def _multipliers(grid: Floats, rows: JerkRows, given: Subproblem | None) -> Floats:
+    """Return multipliers of the rows at gridpoints (N,) to start from: those of another problem nearby, or zeros."""
+    if given is None:
+        return np.zeros((len(grid), rows.first.shape[1] + rows.jerks.shape[1] + 1, 2))
+    return given.multipliers[np.searchsorted((given.s[1:] + given.s[:-1]) / 2.0, grid)]
 
 
 def _updated_rows(interval: Interval, grid: Floats, before: Subproblem) -> JerkRows:

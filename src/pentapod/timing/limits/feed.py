@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -45,15 +46,30 @@ class Feed(MachineLimit):
         return low, high, np.minimum(before, after)
 
     def speeds(self, piece: PieceLike, s: Floats) -> Floats:
-        """Return the largest ṡ (n,), m/s, that the feeds allow at sorted stations s (n,); infinite on rapids."""
-        speed, feeds = np.full(len(s), np.inf), self._feeds(piece)
-        begins, ends, _ = self.guarded_sections(piece)
-        first, last = np.searchsorted(s, begins, "left"), np.searchsorted(s, ends, "right")
-        for m, feed in enumerate(feeds.tolist()):  # guarded sections overlap their neighbours
-            here = slice(int(first[m]), int(last[m]))
-            speed[here] = np.minimum(speed[here], feed)
+        """Return the largest ṡ (n,), m/s, that the feeds allow at stations s (n,); infinite on rapids."""
+        marks, levels = self._levels_of(piece)
+        speed = levels[np.searchsorted(marks, s, "left") + np.searchsorted(marks, s, "right") - 1]
         with np.errstate(divide="ignore"):
             return speed / piece.feed_rate(s)
+
+    def _levels_of(self, piece: PieceLike) -> tuple[Floats, Floats]:
+        """Return the stations (K,) where guarded sections begin or end, and the feeds (2 K,): at each, and after it."""
+        key = id(piece)
+        if key not in self._levels:
+            begins, ends, _ = self.guarded_sections(piece)
+            marks = np.unique(np.concatenate([begins, ends]))
+            levels = np.full(2 * len(marks), np.inf)
+            first, last = 2 * np.searchsorted(marks, begins), 2 * np.searchsorted(marks, ends) + 1
+            for m, feed in enumerate(self._feeds(piece).tolist()):  # guarded sections overlap their neighbours
+                here = slice(int(first[m]), int(last[m]))
+                levels[here] = np.minimum(levels[here], feed)
+            self._levels[key] = piece, marks, levels
+        return self._levels[key][1:]
+
+    @cached_property
+    def _levels(self) -> dict[int, tuple[PieceLike, Floats, Floats]]:
+        """What `_levels_of` has found, by a piece's identity; the piece itself keeps that from being used again."""
+        return {}
 
     def _feeds(self, piece: PieceLike) -> Floats:
         return np.asarray(piece.section_feeds, dtype=np.float64) * self.limit

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, Self
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Floats, row_maxima
 from pentapod.base.values import Value
 from pentapod.timing.path.path import PathDerivatives
 from pentapod.timing.path.setpoints import InterpolatedSetpoints
@@ -102,22 +101,13 @@ def acceleration_ceiling(
     u, and intervals have a common point if each two of them have. Hence the minimum over pairs of rows of
     (size_i |first_j| + size_j |first_i|) / |second_i first_j − second_j first_i| where there is no offset.
     """
-    size, (i, j) = np.broadcast_to(size, first.shape[1]), _pairs(first.shape[1])
-    one = np.abs(first)
-    above = size[i] * one[:, j] + size[j] * one[:, i]
-    across = second[:, i] * first[:, j] - second[:, j] * first[:, i]
-    if offset is not None and offset.any():
-        shift = first[:, j] * offset[:, i] - first[:, i] * offset[:, j]
-        above = np.maximum(above - np.sign(across) * shift, 0.0)
-    below = np.abs(across)
-    # A quotient that overflows is no bound, as it should be.
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        return np.where(below > 0.0, above / below, np.inf).min(axis=1, initial=np.inf)
+    from pentapod.timing.limits.ceiling_kernels import largest_x  # noqa: PLC0415 - loads numba
 
-
-@lru_cache
-def _pairs(count: int) -> tuple[Ints, Ints]:
-    return np.triu_indices(count, 1)
+    size, x = np.array(np.broadcast_to(size, first.shape[1]), dtype=np.float64), np.empty(len(first))
+    offset = np.zeros((1, first.shape[1])) if offset is None else offset
+    plain = (np.require(y, np.float64, ["C", "W"]) for y in (first, second, offset))
+    largest_x(*plain, int(len(offset) > 1), size, x)
+    return x
 
 
 def share_of_room(pushes: Floats, offset: Floats) -> Floats:
@@ -231,7 +221,7 @@ class Limit(Protocol):
 
     def used(self, setpoints: InterpolatedSetpoints) -> Floats:
         """Return the largest share (rows or intervals,) that setpoints use."""
-        return (self.measured(setpoints) / self.bounds).max(axis=1)
+        return row_maxima(self.measured(setpoints) / self.bounds)
 
     def largest(self, setpoints: InterpolatedSetpoints) -> Reading | None:
         """Return value and place of the largest share, None where certificates do not list the limit."""

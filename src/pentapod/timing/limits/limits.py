@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Floats, row_maxima
 from pentapod.base.registry import Registry
 from pentapod.machine.machine import Machine
 from pentapod.machine.rounding import jerk_of_rounding
@@ -136,7 +136,7 @@ class Limits:
         """Return 1/ṡ (n,) in s/m at the lowest of the speed limits that vary within a section."""
         unit = Motion.of(np.ones(len(path.s)), np.zeros(len(path.s)))
         speeds = (limit for limit in self.all if limit.group == "speed" and not limit.sectional)
-        return np.max([self._share(limit, path, unit).max(axis=1) for limit in speeds], axis=0)
+        return np.max([row_maxima(self._share(limit, path, unit)) for limit in speeds], axis=0)
 
     def caps(self, path: PathDerivatives, ceiling: Floats, *, moving: bool) -> Floats:
         """Return shares (n, R) of the rows' limits that no law within the jerk limits exceeds."""
@@ -152,7 +152,7 @@ class Limits:
 
     def largest(self, group: Group, path: PathDerivatives, motion: Motion) -> Floats:
         """Return the largest share (n,) of the limits of one group."""
-        found = [self._share(limit, path, motion).max(axis=1) for limit in self.all if limit.group == group]
+        found = [row_maxima(self._share(limit, path, motion)) for limit in self.all if limit.group == group]
         return np.max(found, axis=0)
 
     def _rows(self, path: PathDerivatives) -> list[tuple[Limit, AccelerationRows]]:

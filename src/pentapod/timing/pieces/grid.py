@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints, row_maxima
 from pentapod.numerics.blocks import blocks
 from pentapod.timing.limits.limits import Limits
 from pentapod.timing.path.path import PathDerivatives, PieceLike
@@ -70,7 +70,7 @@ def _base_grid(piece: PieceLike, limits: Limits, options: GridOptions) -> Floats
     marks[0] = 0.0
     counts = np.ceil(np.diff(marks) / length * options.least_stages - 1e-9).astype(np.intp)
     path = PathDerivatives(piece, (marks[:-1] + marks[1:]) / 2.0)
-    curvature_share = np.abs(limits.rows(path).second).max(axis=1) * limits.ceiling(path)
+    curvature_share = row_maxima(np.abs(limits.rows(path).second)) * limits.ceiling(path)
     counts[curvature_share > options.bend_share] *= options.stages_in_corners
     return subdivided(marks, counts)
 

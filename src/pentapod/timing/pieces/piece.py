@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Floats, Ints, row_maxima
 from pentapod.timing.limits.limit import AccelerationRows, Motion
 from pentapod.timing.limits.limits import Limits
 from pentapod.timing.path.path import PathDerivatives, PieceLike
@@ -130,4 +130,4 @@ class PieceProfile:
             j = law.jerks[np.clip(np.searchsorted(law.times, t, "right") - 1, 0, len(law.jerks) - 1)]
             v, a = law(t, 1), law(t, 2)
             shares = self.limits.shares(PathDerivatives(self.piece, self.s, 3), Motion(v**2, v, a, j))
-        return shares.argmax(axis=1), shares.max(axis=1)
+        return shares.argmax(axis=1), row_maxima(shares)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats
+from pentapod.base.arrays import Bools, Floats, row_maxima
 from pentapod.timing.limits.limit import share_of_room
 from pentapod.timing.limits.limits import Limits
 from pentapod.timing.path.path import PieceLike
@@ -92,7 +92,7 @@ def _switching(profile: PieceProfile, options: RefinementOptions) -> tuple[Bools
         for k in (slice(0, -1), slice(1, None))
     ]
     capped = x > 0.99 * profile.ceiling()
-    share = np.maximum(*ends).max(axis=1)
+    share = row_maxima(np.maximum(*ends))
     idle = (share < 0.98) & ~(capped[:-1] & capped[1:])
     speed = np.sqrt(x)
     seconds = 2.0 * ds / (speed[:-1] + speed[1:])

@@ -19,6 +19,7 @@ from scipy.ndimage import maximum_filter1d
 
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
+from pentapod.numerics.threads import in_threads
 from pentapod.timing.jerk.options import JerkOptions
 from pentapod.timing.pieces.boundary_speeds import law_between, whole_periods
 from pentapod.timing.pieces.piece import PieceProfile
@@ -129,9 +130,11 @@ def repaired_laws(
         before = stood[0] if k == 0 else 0
         return plan, Setpoints(plan.profile, law, jerk_limited, period, before, stood[k + 1])
 
+    def first(k: int) -> tuple[_Plan, Setpoints] | Failure:
+        return timed(k, _planned(profiles[k], machine, jerk_options, options))
+
     current: list[tuple[_Plan, Setpoints]] = []
-    for k, profile in enumerate(profiles):
-        found = timed(k, _planned(profile, machine, jerk_options, options))
+    for k, found in enumerate(in_threads(first, range(len(profiles)))):
         if isinstance(found, Failure):
             return NotRepaired(k, found)
         current.append(found)

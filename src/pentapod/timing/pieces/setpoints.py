@@ -8,9 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Floats, Ints, row_maxima
 from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
+from pentapod.numerics.threads import in_threads
 from pentapod.timing.limits.limit import Group
 from pentapod.timing.path.setpoints import InterpolatedSetpoints, SetpointRows, spline_padding
 from pentapod.timing.pieces.piece import PieceProfile
@@ -115,7 +116,7 @@ class Setpoints:
                 kept = at_rows if len(used) > count else between
                 kept[limit.group] = np.maximum(kept[limit.group], used)
         speed, acceleration, jerk = (np.maximum(at_rows[group], _at_rows(between[group])) for group in at_rows)
-        reach = np.sqrt((joined.legs.rates[joined.own_intervals] / machine.legs.max_jerk).max(axis=1))
+        reach = np.sqrt(row_maxima(joined.legs.rates[joined.own_intervals] / machine.legs.max_jerk))
         return LimitShares(speed, acceleration, jerk, _at_rows(reach))
 
 
@@ -128,7 +129,9 @@ def measured(pieces: Sequence[Setpoints], machine: Machine, known: Sequence[Limi
     """Return the shares of each piece; those that are known are not measured again."""
     begins = np.concatenate([[0], np.cumsum([piece.count for piece in pieces])]).tolist()
     lengths = np.concatenate([[0.0], np.cumsum([piece.law.length for piece in pieces])])
-    return [_measured(pieces, begins, lengths, k, machine) if same is None else same for k, same in enumerate(known)]
+    asked = [k for k, same in enumerate(known) if same is None]
+    found = in_threads(lambda k: _measured(pieces, begins, lengths, k, machine), asked)
+    return [next(found) if same is None else same for same in known]
 
 
 def unaffected(pieces: Sequence[Setpoints], shares: list[LimitShares], changed: list[int]) -> list[LimitShares | None]:
