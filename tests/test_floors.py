@@ -22,7 +22,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("simulate", "registration"),
     ("job",),
     ("report",),
-    ("view",),
+    ("view", "batch"),
     ("cli",),
 )
 PLACES = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}

@@ -20,6 +20,8 @@ HEAVY = (
     "rich",
     "jinja2",
     "numba",
+    "dask",
+    "distributed",
 )
 
 FIND = "import json, sys; print(json.dumps([m for m in {heavy!r} if m in sys.modules]))"
@@ -43,7 +45,7 @@ def test_help_is_light(arguments: list[str]) -> None:
 
 def test_every_name_loads_without_the_solvers() -> None:
     code = "import pentapod\nfor name in pentapod.__all__: getattr(pentapod, name)"
-    assert loaded_after(code, ("casadi", "toppra", "matplotlib", "plotly", "trimesh", "numba")) == []
+    assert loaded_after(code, ("casadi", "toppra", "matplotlib", "plotly", "trimesh", "numba", "distributed")) == []
 
 
 def test_the_check_can_fail() -> None:

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from pentapod.base import Refusal as Refusal
     from pentapod.base import RefusalError as RefusalError
     from pentapod.base.version import __version__ as __version__
+    from pentapod.batch import Sweep as Sweep
+    from pentapod.batch import batch as batch
     from pentapod.cutters import BallCutter as BallCutter
     from pentapod.cutters import BullNose as BullNose
     from pentapod.cutters import FlatEnd as FlatEnd
@@ -122,6 +124,7 @@ _ROOMS = {
     "simulate": "Reference simulate_servo Played",
     "job": "Job run judge Outcome",
     "report": "write_report",
+    "batch": "batch Sweep",
     "base.version": "__version__",
 }
 _HOMES = {name: room for room, names in _ROOMS.items() for name in names.split()}
@@ -135,7 +138,7 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'pentapod' has no attribute {name!r}")
     home = import_module(f"pentapod.{_HOMES[name]}")
-    if name == "verify":  # a package that can be called
+    if name in ("verify", "batch"):  # packages that can be called
         return home
     value = getattr(home, name)
     globals()[name] = value

@@ -1,10 +1,11 @@
-"""TOML files: reading and parsing, with errors that name line, key and remedy."""
+"""TOML files: reading and parsing, with errors that name line, key and remedy; tables written as TOML."""
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -109,3 +110,27 @@ def line_of(text: str, where: Sequence[str]) -> int | None:
         if wanted and re.match(rf"\s*{re.escape(wanted[0])}\s*=", line):
             return number
     return header
+
+
+def toml_text(content: Mapping[str, Any]) -> str:
+    """Return keys and tables of keys as the text of a TOML file, in their order, plain keys first; None is left out."""
+    plain = {key: value for key, value in content.items() if not isinstance(value, Mapping)}
+    lines = [*_lines(plain), ""] if plain else []
+    for name, table in content.items():
+        if name not in plain:
+            lines += [f"[{name}]", *_lines(table), ""]
+    return "\n".join(lines)
+
+
+def _lines(table: Mapping[str, Any]) -> list[str]:
+    return [f"{key} = {_value(value)}" for key, value in table.items() if value is not None]
+
+
+def _value(value: Any) -> str:
+    """Return a value in TOML: the spelling of texts, numbers, truth values and lists is that of JSON."""
+    if isinstance(value, Mapping):
+        inner = cast("Mapping[str, Any]", value)
+        return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in inner.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value(item) for item in cast("Sequence[Any]", value)) + "]"
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -15,6 +15,8 @@ VERBS = {
     "view": "pentapod.cli.commands.view:view",
     "post": "pentapod.cli.commands.post:post",
     "toolpath": "pentapod.cli.commands.toolpath:toolpath",
+    "batch": "pentapod.cli.many.batch:batch",
+    "sweep": "pentapod.cli.many.batch:sweep",
     "replan": "pentapod.cli.commands.replan:replan",
     "register": "pentapod.cli.commands.register:register",
     "machine": "pentapod.cli.commands.machine:machine",

@@ -47,11 +47,11 @@ def staged(folder: Path) -> Generator[Path]:
     where another run is writing into the folder, or it cannot be written.
     """
     made = [path for path in (folder, *folder.parents) if not path.exists()]
-    with _locked(folder, make=True) as alone:
+    with locked(folder, make=True) as alone:
         try:
             if alone:
                 _complete(folder)
-                _remove_unfinished(folder)
+                remove_unfinished(folder)
             yield from _transaction(folder)
         except BaseException:
             for path in made:
@@ -100,7 +100,7 @@ def check_run(folder: Path) -> None:
     """
     for whole in (folder, folder.parent):
         if (whole / _FINISHED / MANIFEST).is_file():
-            with _locked(whole):
+            with locked(whole):
                 _complete(whole)
     if changed := _changed_files(folder):
         raise InputError(
@@ -110,7 +110,7 @@ def check_run(folder: Path) -> None:
 
 
 @contextmanager
-def _locked(folder: Path, *, make: bool = False) -> Generator[bool]:
+def locked(folder: Path, *, make: bool = False) -> Generator[bool]:
     """Hold the folder's lock; yield False where the file system has none. Raises InputError where another holds it.
 
     The lock is the system's, on the folder itself: it ends with the process.
@@ -154,7 +154,7 @@ def _try_lock(handle: int, folder: Path) -> bool:
     return True
 
 
-def _remove_unfinished(folder: Path) -> None:
+def remove_unfinished(folder: Path) -> None:
     """Remove unfinished folders of killed runs; the lock shows that those runs have ended."""
     for path in folder.glob(".unfinished-*"):
         if path.is_dir() and not path.is_symlink() and _UNFINISHED.fullmatch(path.name):

@@ -19,8 +19,15 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 
+CORES = "PENTAPOD_CORES"
+"""Environment variable: how many cores a process uses, where others work beside it."""
+
+
 def cores() -> int:
-    """Return how many cores this process may use."""
+    """Return how many cores this process may use: as the environment variable says, else all it is allowed."""
+    given = os.environ.get(CORES, "")
+    if given.isdecimal() and int(given) > 0:
+        return int(given)
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

@@ -14,7 +14,6 @@ from pentapod.report.figure import PLOT_CONFIG, as_script
 def write_page(path: str | Path, template: str, **context: Any) -> Path:
     """Write the page of a template of this folder and return its path. Raises InputError: it cannot be written."""
     import jinja2  # noqa: PLC0415 - heavy, and only needed here
-    import plotly.offline  # noqa: PLC0415
 
     folder = resources.files("pentapod.report")
     files = {name: (folder / name).read_text(encoding="utf-8") for name in (template, "style.css", "page.js")}
@@ -23,10 +22,17 @@ def write_page(path: str | Path, template: str, **context: Any) -> Path:
     text = environment.from_string(files[template]).render(
         style=files["style.css"],
         script=files["page.js"],
-        plotly=plotly.offline.get_plotlyjs(),
+        plotly=_plotly() if "{{ plotly" in files[template] else "",
         plot_config=as_script(PLOT_CONFIG),
         **context,
     )
     with atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return Path(path)
+
+
+def _plotly() -> str:
+    """Return the JavaScript of figures, which a page without any does not need."""
+    import plotly.offline  # noqa: PLC0415
+
+    return plotly.offline.get_plotlyjs()

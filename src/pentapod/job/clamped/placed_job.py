@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,7 +12,7 @@ from pydantic import ValidationError
 from pentapod.base.errors import InputError
 from pentapod.base.files import atomic_write
 from pentapod.base.tables import problem_of
-from pentapod.base.toml import line_of, parsed, read_toml
+from pentapod.base.toml import line_of, parsed, read_toml, toml_text
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.build.placement import fixed_placement, job_at
 from pentapod.job.schema.job import Job
@@ -60,22 +59,13 @@ def placed_job(job: Job, placement: RigidTransform, folder: Path) -> Job:
     content = fixed.tables.model_dump(mode="json", exclude_unset=True)
     content["placement"] = fixed.placement.model_dump(mode="json", exclude_defaults=True)
     folder.mkdir(parents=True, exist_ok=True)
-    for table, key, path in _paths(job):
+    for table, key, path in job.named_files:
         content[table][key] = _relative(path, folder)
-    text = [f"# {job.path.name}, with the part where it was found", ""]
-    for name, table in content.items():
-        text += [f"[{name}]", *(f"{key} = {_value(value)}" for key, value in table.items() if value is not None), ""]
     file = folder / PLACED_JOB
     with atomic_write(file) as temporary:
-        temporary.write_text("\n".join(text), encoding="utf-8")
+        head = f"# {job.path.name}, with the part where it was found\n\n"
+        temporary.write_text(head + toml_text(content), encoding="utf-8")
     return Job.load(file)
-
-
-def _paths(job: Job) -> list[tuple[str, str, Path]]:
-    """Return table, key and path of each file that a job names."""
-    found = [("part", "mesh", job.mesh_path), *(("toolpath", key, path) for key, path in job.files.items())]
-    found += [] if job.machine_file is None else [("machine", "file", job.machine_file)]
-    return found + ([] if job.fixture_mesh is None else [("fixture", "mesh", job.fixture_mesh)])
 
 
 def _relative(path: Path, folder: Path) -> str:
@@ -83,16 +73,6 @@ def _relative(path: Path, folder: Path) -> str:
         return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
     except ValueError:  # on another drive
         return path.resolve().as_posix()
-
-
-def _value(value: Any) -> str:
-    """Return a value in TOML."""
-    if isinstance(value, Mapping):
-        inner = cast("Mapping[str, Any]", value)
-        return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in inner.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(_value(item) for item in cast("list[Any]", value)) + "]"
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _tuples(value: Any) -> Any:

@@ -172,6 +172,14 @@ class Job(Value):
         canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 
+    @property
+    def named_files(self) -> tuple[tuple[str, str, Path], ...]:
+        """Table, key and path of each file that the job names."""
+        found = [("part", "mesh", self.mesh_path), *(("toolpath", key, path) for key, path in self.files.items())]
+        found += [] if self.machine_file is None else [("machine", "file", self.machine_file)]
+        found += [] if self.fixture_mesh is None else [("fixture", "mesh", self.fixture_mesh)]
+        return tuple(found)
+
     def error(self, table: str, key: str, what: str, **details: Any) -> JobError:
         """Return the JobError about a key of this job that is found with the mesh or the machine."""
         text = None

@@ -1,0 +1,73 @@
+"""Dask: workers on this machine, or a scheduler that runs somewhere."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Generator
+from contextlib import contextmanager
+from typing import Any
+
+from pentapod.base.display import load_extra
+from pentapod.base.errors import InputError
+
+_SETTINGS = {
+    # A worker gets the next task when it has none, so that its death is nobody else's.
+    "distributed.scheduler.worker-saturation": 1.0,
+    # The engine runs a task again, and counts; the scheduler shall not.
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.worker.daemon": True,
+}
+CONNECT_S = 15.0
+"""Seconds in which a scheduler must answer."""
+
+CLOSE_S = 5.0
+"""Seconds in which workers must end before they are killed."""
+
+
+@contextmanager
+def client_of(scheduler: str | None, workers: int | None) -> Generator[Any]:
+    """Yield a Dask client. scheduler: address; None for `workers` processes on this machine, which listen to it alone.
+
+    Raises InputError where Dask is not installed, or no scheduler answers.
+    """
+    distributed = load_extra("distributed", "batch", "many jobs need Dask, which is not installed")
+    import dask.config  # noqa: PLC0415
+
+    if scheduler is not None:
+        try:
+            client = distributed.Client(scheduler, timeout=CONNECT_S, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise InputError(
+                "no scheduler answers", key="scheduler", value=scheduler, expected='an address, "tcp://host:8786"',
+                remedy='"dask scheduler" starts one',
+            ) from error  # fmt: skip
+        with client:
+            yield client
+        return
+    with dask.config.set(_SETTINGS), _quiet():
+        cluster = distributed.LocalCluster(
+            n_workers=workers, threads_per_worker=1, memory_limit=0, host="127.0.0.1", dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"}, silence_logs=logging.CRITICAL,
+        )  # fmt: skip
+        try:
+            with distributed.Client(cluster, set_as_default=False) as client:
+                yield client
+        finally:
+            cluster.close(timeout=CLOSE_S)
+
+
+def lost_scheduler(client: Any) -> bool:
+    """Return whether a client has lost its scheduler."""
+    return client.status != "running"
+
+
+@contextmanager
+def _quiet() -> Generator[None]:
+    """Keep Dask's log to itself: the death of a worker is told by the table."""
+    log = logging.getLogger("distributed")
+    level = log.level
+    log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
