@@ -1,25 +1,45 @@
 """Many jobs, and sweeps of them, on the workers of Dask: each done once, its folder whole, tables of them all.
 
-The package can be called like its function `batch`, since both have the name `pentapod.batch`.
+The package can be called like its function `batch`, since both have the name `pentapod.batch`. The names below are
+imported when they are first used, so that the processes of the workers start quickly.
 """
+
+from __future__ import annotations
 
 import sys
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pentapod.batch.engine import Done, Engine, EngineOptions
-from pentapod.batch.run import Batch, batch
-from pentapod.batch.store import Input, Store
-from pentapod.batch.sweep import Sweep
-from pentapod.batch.task import Row, Task
+from pentapod.base.registry import imported_when_used
 
-__all__ = ["Batch", "Done", "Engine", "EngineOptions", "Input", "Row", "Store", "Sweep", "Task", "batch"]
+if TYPE_CHECKING:
+    from pentapod.batch.run import Batch as Batch
+    from pentapod.batch.run import batch as batch
+    from pentapod.batch.sweep import Sweep as Sweep
+    from pentapod.batch.tasks.engine import Done as Done
+    from pentapod.batch.tasks.engine import Engine as Engine
+    from pentapod.batch.tasks.engine import EngineOptions as EngineOptions
+    from pentapod.batch.tasks.store import Input as Input
+    from pentapod.batch.tasks.store import Store as Store
+    from pentapod.batch.tasks.task import Row as Row
+    from pentapod.batch.tasks.task import Task as Task
+
+_HOMES = {
+    "batch.run": "Batch batch",
+    "batch.sweep": "Sweep",
+    "batch.tasks.engine": "Done Engine EngineOptions",
+    "batch.tasks.store": "Input Store",
+    "batch.tasks.task": "Row Task",
+}
+
+if not TYPE_CHECKING:  # type checkers read the imports above
+    __getattr__, __dir__, __all__ = imported_when_used(__name__, _HOMES)
 
 
 class _Callable(ModuleType):
     def __call__(self, *given: Any, **asked: Any) -> Batch:
         """Plan and verify jobs, as `run.batch`."""
-        return batch(*given, **asked)
+        return sys.modules[__name__].batch(*given, **asked)
 
 
 sys.modules[__name__].__class__ = _Callable

@@ -10,8 +10,8 @@ from pentapod.base.errors import InputError
 from pentapod.base.files import sha256_of
 from pentapod.base.toml import toml_text
 from pentapod.batch.changes import machine_content
-from pentapod.batch.store import Input, Store
-from pentapod.batch.task import Row, Task
+from pentapod.batch.tasks.store import Input, Store
+from pentapod.batch.tasks.task import Row, Task
 from pentapod.job.artefacts import PROGRAM, REPORT, WITHHELD
 from pentapod.job.schema.job import Job
 
@@ -105,7 +105,7 @@ def outcome_row(outcome: Any, folder: Path) -> Row:
         "margin": None if nearest is None else margins[nearest],
         "margin_limit": nearest,
         "margins": margins,
-        "cycle_time_s": seconds or None,
+        "cycle_time_s": round(seconds, 6) or None,
         "limiting_cause": max(costs, key=lambda name: costs[name], default=None),
         "program_sha256": " ".join(digests) or None,
         "job_digest": outcome.job.digest,

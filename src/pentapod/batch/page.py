@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pentapod.batch.jobs import STATUSES
-from pentapod.batch.task import Row
+from pentapod.batch.tasks.task import Row
 from pentapod.job.artefacts import REPORT
 from pentapod.report.template import write_page
 from pentapod.report.words import duration, number

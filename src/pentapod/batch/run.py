@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 
-from pentapod.batch.engine import OPTIONS, Done, Engine, EngineOptions
 from pentapod.batch.jobs import RESULTS, job_task
 from pentapod.batch.page import write_batch_page
 from pentapod.batch.sweep import Sweep
 from pentapod.batch.table import parquet_library, write_tables
-from pentapod.batch.task import Row, Task
+from pentapod.batch.tasks.engine import OPTIONS, Done, Engine, EngineOptions
+from pentapod.batch.tasks.task import Row, Task
 from pentapod.job.schema.job import Job
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn, cast
 
+import numpy as np
 from pydantic import Field, ValidationError
 
 from pentapod.base.errors import InputError
@@ -18,8 +19,8 @@ from pentapod.base.toml import line_of, parsed, read_toml
 from pentapod.base.values import Value
 from pentapod.batch.changes import changed, unknown
 from pentapod.batch.jobs import job_task
-from pentapod.batch.store import Store
-from pentapod.batch.task import Task
+from pentapod.batch.tasks.store import Store
+from pentapod.batch.tasks.task import Task
 from pentapod.job.schema.job import Job
 
 RANGE = {"from", "to", "steps"}
@@ -150,9 +151,9 @@ class _Reader:
         count = self._tables.samples
         if count is None or count > most:
             self._wrong(None, "how many points the sample has", "samples", value=count, expected=f"1 to {most}")
-        sequence = qmc.Sobol(len(given), scramble=True, seed=self._tables.seed)
-        points = sequence.random_base2(max(1, math.ceil(math.log2(count))))[:count]
-        for point in points.tolist():
+        points = qmc.Sobol(len(given), scramble=False).random_base2(max(1, math.ceil(math.log2(count))))[:count]
+        shift = np.random.default_rng(self._tables.seed).random(len(given))
+        for point in ((points + shift) % 1.0).tolist():
             yield tuple(self._drawn(key, value, x) for (key, value), x in zip(given.items(), point, strict=True))
 
     def _drawn(self, key: str, value: Any, x: float) -> Any:

@@ -11,7 +11,7 @@ from typing import Any
 
 from pentapod.base.display import load_extra
 from pentapod.base.files import atomic_write
-from pentapod.batch.task import Row
+from pentapod.batch.tasks.task import Row
 
 CSV, LINES, PARQUET = "table.csv", "table.jsonl", "table.parquet"
 
@@ -31,9 +31,14 @@ def csv_text(rows: Sequence[Row], last: Sequence[str]) -> str:
     return text.getvalue()
 
 
-def lines_text(rows: Sequence[Row]) -> str:
-    """Return rows as JSON Lines, with their nested columns."""
-    return "".join(f"{json.dumps(row, ensure_ascii=False, allow_nan=False)}\n" for row in rows)
+def lines_text(rows: Sequence[Row], last: Sequence[str]) -> str:
+    """Return rows as JSON Lines: the columns of the CSV, then nested ones, their keys sorted."""
+    names, lines = columns(rows, last), list[str]()
+    for row in rows:
+        plain = {name: row.get(name) for name in names}
+        nested = {name: dict(sorted(row[name].items())) for name in sorted(row) if isinstance(row[name], Mapping)}
+        lines.append(json.dumps({**plain, **nested}, ensure_ascii=False, allow_nan=False) + "\n")
+    return "".join(lines)
 
 
 def write_tables(rows: Sequence[Row], last: Sequence[str], folder: Path, *, parquet: bool = False) -> list[Path]:
@@ -41,7 +46,7 @@ def write_tables(rows: Sequence[Row], last: Sequence[str], folder: Path, *, parq
 
     Raises InputError where pyarrow is missing, or the folder cannot be written.
     """
-    texts = {CSV: csv_text(rows, last), LINES: lines_text(rows)}
+    texts = {CSV: csv_text(rows, last), LINES: lines_text(rows, last)}
     for name, text in texts.items():
         with atomic_write(folder / name) as temporary:
             temporary.write_text(text, encoding="utf-8")
@@ -49,15 +54,14 @@ def write_tables(rows: Sequence[Row], last: Sequence[str], folder: Path, *, parq
     return [*written, _write_parquet(rows, last, folder / PARQUET)] if parquet else written
 
 
-def parquet_library() -> Any:
-    """Return pyarrow. Raises InputError where it is missing."""
-    return load_extra("pyarrow.parquet", "parquet", "Parquet files need pyarrow, which is not installed")
+def parquet_library() -> list[Any]:
+    """Return pyarrow, and its module of Parquet files. Raises InputError where it is missing."""
+    what = "Parquet files need pyarrow, which is not installed"
+    return [load_extra(module, "parquet", what) for module in ("pyarrow", "pyarrow.parquet")]
 
 
 def _write_parquet(rows: Sequence[Row], last: Sequence[str], path: Path) -> Path:
-    parquet = parquet_library()
-    import pyarrow  # noqa: PLC0415
-
+    pyarrow, parquet = parquet_library()
     names = columns(rows, last)
     data = {name: _alike([_plain(row.get(name)) for row in rows]) for name in names}
     with atomic_write(path) as temporary:

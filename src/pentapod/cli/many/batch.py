@@ -77,9 +77,9 @@ def _run(
     as_json: bool, quiet: bool,
 ) -> int:  # fmt: skip
     from pentapod.base.errors import InputError
-    from pentapod.batch.engine import EngineOptions
     from pentapod.batch.pace import Pace
     from pentapod.batch.run import batch as run
+    from pentapod.batch.tasks.engine import EngineOptions
 
     if workers is not None and scheduler is not None:
         raise InputError("--workers and --scheduler are both given", expected="one of the two")

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from pentapod.batch.child import OUT_OF_MEMORY
+from pentapod.batch.tasks.child import OUT_OF_MEMORY
 from pentapod.numerics.threads import CORES
 
 POLL_S = 0.2
@@ -27,7 +27,7 @@ class Child:
     def __init__(self) -> None:
         environment = {**os.environ, **dict.fromkeys(_THREADS, "1"), "PYTHONPATH": os.pathsep.join(sys.path)}
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "pentapod.batch.child"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            [sys.executable, "-m", "pentapod.batch.tasks.child"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL, env=environment, start_new_session=True,
         )  # fmt: skip
         self._lines: SimpleQueue[bytes] = SimpleQueue()

@@ -14,7 +14,7 @@ from typing import Any
 from pentapod.base.errors import InputError
 from pentapod.base.values import Value
 from pentapod.base.version import __version__, library_versions
-from pentapod.batch.store import Input, named
+from pentapod.batch.tasks.store import Input, named
 
 Row = dict[str, Any]
 """Columns of a table by name: texts, numbers, None, and lists or dicts of them, as JSON has them."""
@@ -83,7 +83,7 @@ def versions() -> dict[str, str]:
 
 def _sources() -> str:
     """Return a digest of pentapod's own files: between two releases its version stays the same."""
-    folder, digest = Path(__file__).parents[1], hashlib.sha256()
+    folder, digest = Path(__file__).parents[2], hashlib.sha256()
     for file in sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".toml", ".j2", ".css", ".js")):
         digest.update(f"{file.relative_to(folder).as_posix()}\0".encode() + file.read_bytes() + b"\0")
     return digest.hexdigest()[:16]

@@ -17,11 +17,11 @@ from typing import Any, Self
 
 from pentapod.base.errors import InputError
 from pentapod.base.values import Value
-from pentapod.batch.cluster import client_of, lost_scheduler
-from pentapod.batch.folder import ROW, finished_row, unpack
-from pentapod.batch.store import INPUTS, Store
-from pentapod.batch.task import Row, Task, versions
-from pentapod.batch.worker import Answer, Order, execute, receive
+from pentapod.batch.tasks.cluster import client_of, lost_scheduler
+from pentapod.batch.tasks.folder import ROW, finished_row, unpack
+from pentapod.batch.tasks.store import INPUTS, Store
+from pentapod.batch.tasks.task import Row, Task, versions
+from pentapod.batch.tasks.worker import Answer, Order, execute, receive
 from pentapod.job.run_folder import locked, remove_unfinished
 
 LOG = "log.jsonl"
@@ -67,7 +67,7 @@ class Done(Value):
     @property
     def columns(self) -> Row:
         """The row of the table: what was known beforehand, and the result."""
-        return {**self.task.known, **self.row, "task": self.task.name}
+        return {**self.task.known, **dict(sorted(self.row.items())), "task": self.task.name}
 
 
 class Engine:

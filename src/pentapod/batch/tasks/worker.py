@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from pentapod.base.files import atomic_write, sha256_of
-from pentapod.batch.folder import finish, finished_row, packed, write_files
-from pentapod.batch.process import Child
-from pentapod.batch.store import INPUTS, Input
-from pentapod.batch.task import Row, Task, versions
+from pentapod.batch.tasks.folder import finish, finished_row, packed, write_files
+from pentapod.batch.tasks.process import Child
+from pentapod.batch.tasks.store import INPUTS, Input
+from pentapod.batch.tasks.task import Row, Task, versions
 
 _RUNNING = ("running", "paused")
 
@@ -41,7 +41,7 @@ class Answer:
 
     crashed: why the task ended without a row, and would again. died: how its process ended. missing: inputs that are
     not on the worker's file system. packed: the finished folder, where the driver does not see it. seconds: that the
-    task took, with `waited` before its process was ready.
+    task took. trace: where it crashed.
     """
 
     worker: str

@@ -1,4 +1,4 @@
-"""The process in which the tasks of one worker run, one after the other: `python -m pentapod.batch.child`.
+"""The process in which the tasks of one worker run, one after the other: `python -m pentapod.batch.tasks.child`.
 
 Whatever a task does to its process, the worker lives on. Lines of JSON come in by standard input and go out by standard
 output; what tasks print goes to standard error. When the worker ends, the process does.
@@ -16,7 +16,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
-from pentapod.batch.task import function_of
+from pentapod.batch.tasks.task import function_of
 
 OUT_OF_MEMORY = "out of memory"
 

@@ -8,7 +8,7 @@ import zipfile
 from pathlib import Path
 
 from pentapod.base.files import atomic_write
-from pentapod.batch.task import Row, Task
+from pentapod.batch.tasks.task import Row, Task
 
 ROW = "row.json"
 """The row of a finished task, in its folder. It is written last."""
