@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import sys
 from pathlib import Path
 
 from pentapod.batch.tasks import worker as tasks_worker
@@ -13,7 +14,8 @@ def scheduler():
 
     async def serve():
         async with Scheduler(host="127.0.0.1", port=0, dashboard_address="127.0.0.1:0", dashboard=False) as served:
-            print(served.address, flush=True)
+            sys.stdout.write(f"{served.address}\n")
+            sys.stdout.flush()
             await served.finished()
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)

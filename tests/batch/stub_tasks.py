@@ -47,4 +47,4 @@ def begun(log):
 def done_twice(made, folder, log):
     """Numbers of tasks that were begun again after their folder was whole."""
     whole = {task.arguments["number"]: (folder / task.name / ROW).stat().st_mtime for task in made}
-    return [number for number, when in begun(log) if when > whole[number]]
+    return [number for number, when in begun(log) if number in whole and when > whole[number]]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from pentapod.base.display import load_extra
@@ -20,8 +20,8 @@ _SETTINGS = {
 CONNECT_S = 15.0
 """Seconds in which a scheduler must answer."""
 
-CLOSE_S = 5.0
-"""Seconds in which workers must end before they are killed."""
+CLOSE_S = 30.0
+"""Seconds in which workers are waited for at the end; those that are left end with this process."""
 
 
 @contextmanager
@@ -53,7 +53,8 @@ def client_of(scheduler: str | None, workers: int | None) -> Generator[Any]:
             with distributed.Client(cluster, set_as_default=False) as client:
                 yield client
         finally:
-            cluster.close(timeout=CLOSE_S)
+            with suppress(TimeoutError):
+                cluster.close(timeout=CLOSE_S)
 
 
 def lost_scheduler(client: Any) -> bool:
@@ -64,10 +65,12 @@ def lost_scheduler(client: Any) -> bool:
 @contextmanager
 def _quiet() -> Generator[None]:
     """Keep Dask's log to itself: the death of a worker is told by the table."""
-    log = logging.getLogger("distributed")
-    level = log.level
-    log.setLevel(logging.CRITICAL)
+    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] == "distributed"]
+    levels = {name: logging.getLogger(name).level for name in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         yield
     finally:
-        log.setLevel(level)
+        for name, level in levels.items():
+            logging.getLogger(name).setLevel(level)
