@@ -39,6 +39,7 @@ PACKAGES = (
     "pentapod.verify",
     "pentapod.simulate",
     "pentapod.job",
+    "pentapod.batch",
 )
 _MADE = "<!-- Made from the code by docs/make_reference.py; change the code, then run `make reference`. -->\n\n"
 _WIDE = 88

@@ -22,21 +22,23 @@ def rows_of(made, out, workers):
         return {done.task.name: done.columns for done in engine.run(made)}
 
 
-def run_and_kill(command, seed, least, most, patience):
+def run_and_kill(command, log, seed, most, patience):
     """Run a command till it succeeds, killing it or one of its processes every so often; return how often which.
 
-    least, most: seconds between two kills.
+    log: of the tasks that were begun; most: how many more of them there are at most before the next kill. So a busy
+    machine gets on as well.
     """
     chance, counts, until = random.Random(seed), {"drivers": 0, "workers": 0}, time.monotonic() + patience
     while time.monotonic() < until:
         driver = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
             while driver.poll() is None and time.monotonic() < until:
-                try:
-                    driver.wait(chance.uniform(least, most))
+                enough = len(stub_tasks.begun(log)) + chance.randint(1, most)
+                while driver.poll() is None and time.monotonic() < until and len(stub_tasks.begun(log)) < enough:
+                    time.sleep(0.02)
+                time.sleep(chance.uniform(0.0, 0.5))
+                if driver.poll() is not None:
                     break
-                except subprocess.TimeoutExpired:
-                    pass
                 if chance.random() < 0.3:
                     counts["drivers"] += 1
                     driver.kill()

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 from pentapod.batch import Task
+from pentapod.batch.jobs import plan_in
 from pentapod.batch.tasks.folder import ROW
 
 
@@ -48,3 +49,10 @@ def done_twice(made, folder, log):
     """Numbers of tasks that were begun again after their folder was whole."""
     whole = {task.arguments["number"]: (folder / task.name / ROW).stat().st_mtime for task in made}
     return [number for number, when in begun(log) if number in whole and when > whole[number]]
+
+
+def planned(folder, number, log, job):
+    """Plan a job as a batch does; note in `log` (a file) when it began."""
+    with Path(log).open("a", encoding="utf-8") as file:
+        file.write(f"{number} {time.time()} {os.getpid()} {os.getppid()}\n")
+    return plan_in(folder, job)

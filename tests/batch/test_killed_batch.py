@@ -27,7 +27,7 @@ MAIN = "from pentapod.cli.main import main; main()"
 def test_hundred_tasks_with_drivers_and_workers_killed_at_random(tmp_path):
     count, seconds = 100, 0.4
     command = [sys.executable, str(HERE / "killed_batch.py"), str(tmp_path / "runs"), str(tmp_path / "log")]
-    killed = killed_batch.run_and_kill([*command, str(count), str(seconds)], 1, 2.0, 12.0, 1200.0)
+    killed = killed_batch.run_and_kill([*command, str(count), str(seconds)], tmp_path / "log", 1, 12, 1800.0)
     made = stub_tasks.tasks(count, tmp_path / "log", seconds)
     assert killed["drivers"] > 0
     assert killed["workers"] > 0

@@ -1,6 +1,8 @@
 """Sweep files: values by the path of a key, combined; bad ones told in one line before anything is run."""
 
+import csv
 import datetime
+import io
 import json
 import re
 import sys
@@ -12,7 +14,8 @@ import pytest
 from pentapod.base.errors import InputError
 from pentapod.batch import Store, Sweep
 from pentapod.batch.jobs import RESULTS, job_task, plan_in
-from pentapod.batch.table import csv_text
+from pentapod.batch.pace import Pace
+from pentapod.batch.table import csv_text, lines_text, write_tables
 from pentapod.cli.main import run
 from pentapod.job import Job
 from pentapod.machine import CalibrationRecord, Machine, MeasuredGeometry, geometry_digest, write_calibration
@@ -172,3 +175,48 @@ def test_the_commands_tell_what_is_wrong(make_job, tmp_path, capsys, monkeypatch
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert run(["batch", str(job)]) == 2
     assert 'pip install "pentapod[batch]"' in capsys.readouterr().err
+
+
+def test_tables_of_one_batch_hold_the_same(tmp_path):
+    rows = [
+        {"job": "a", "tool.length_mm": 190, "status": "passed", "margin": 0.1 + 0.2, "margins": {"b": 1.0, "a": 2.0}},
+        {
+            "job": "b",
+            "tool.length_mm": 198.5,
+            "status": "refused",
+            "margin": None,
+            "points": [[1, 2]],
+            "cause": 'a, "b"',
+        },
+    ]
+    last = ("status", "cause", "margin")
+    text = csv_text(rows, last)
+    assert list(csv.reader(io.StringIO(text))) == [
+        ["job", "tool.length_mm", "points", "status", "cause", "margin"],
+        ["a", "190", "", "passed", "", "0.30000000000000004"],
+        ["b", "198.5", "[[1, 2]]", "refused", 'a, "b"', ""],
+    ]
+    first, second = (json.loads(line) for line in lines_text(rows, last).splitlines())
+    assert first == {**rows[0], "points": None, "cause": None}
+    assert list(first["margins"]) == ["a", "b"]
+    assert second == rows[1]
+    parquet = pytest.importorskip("pyarrow.parquet")
+    written = write_tables(rows, last, tmp_path, parquet=True)
+    assert parquet.read_table(written[2]).to_pylist()[1]["tool.length_mm"] == 198.5
+
+
+def test_without_pyarrow_the_error_says_what_to_install(make_job, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert run(["batch", str(make_job()), "--parquet"]) == 2
+    assert 'pip install "pentapod[parquet]"' in capsys.readouterr().err
+
+
+def test_pace_tells_rate_and_time_left():
+    now = [0.0]
+    pace = Pace(10, lambda: now[0])
+    pace.count(new=False)
+    assert str(pace) == "1 of 10"  # how long one takes is not known yet
+    now[0] = 30.0
+    pace.count(new=True)
+    pace.count(new=True)
+    assert str(pace) == "3 of 10, 4 a minute, 2 min left"

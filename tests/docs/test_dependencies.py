@@ -16,7 +16,7 @@ def numbers(text: str) -> list[int]:
 def declared() -> dict[str, list[int]]:
     """Lower bounds by name."""
     lines = [*PROJECT["dependencies"], *(line for extra in PROJECT["optional-dependencies"].values() for line in extra)]
-    found = [re.match(r"([A-Za-z0-9_.-]+)[>=]=([0-9.]+)", line) for line in lines]
+    found = [re.match(r"([A-Za-z0-9_.-]+)(?:\[[a-z]+\])?[>=]=([0-9.]+)", line) for line in lines]
     assert all(found)
     return {match[1].lower(): numbers(match[2]) for match in found if match}
 

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from pentapod.base.files import sha256_of
+from pentapod.batch import Store, Sweep
 from pentapod.cli.main import run
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job
@@ -25,6 +26,7 @@ from pentapod.program import Program, Provenance, write_csv
 
 ROOT = Path(__file__).parents[2]
 MACHINE_TABLES = ["calibration", "guides", "leg_model"]
+LONG = ("setups", "register", "many-jobs")
 GUIDES = [*sorted(ROOT.glob("docs/howto/*.md")), ROOT / "docs" / "tutorial.md"]
 
 
@@ -46,7 +48,7 @@ def test_the_reference_is_what_the_code_says():
 
 
 @pytest.mark.parametrize(
-    "page", [pytest.param(p, marks=[pytest.mark.slow] * (p.stem in ("setups", "register")), id=p.stem) for p in GUIDES]
+    "page", [pytest.param(p, marks=[pytest.mark.slow] * (p.stem in LONG), id=p.stem) for p in GUIDES]
 )
 def test_every_command_runs_as_written(page, tmp_path, monkeypatch):
     shutil.copytree(ROOT / "toolpaths", tmp_path / "toolpaths")
@@ -90,6 +92,11 @@ def test_every_table_of_a_job_is_one(page, tmp_path):
         "feed": "cut_mm_min = 1500\n",
     }
     for block in blocks(page, "toml"):
+        if block.startswith("job ="):
+            shutil.copy(ROOT / "toolpaths" / "dome.toml", tmp_path)
+            (tmp_path / "sweep.toml").write_text(block, encoding="utf-8")
+            assert Sweep.load(tmp_path / "sweep.toml").tasks(Store(tmp_path))
+            continue
         table = re.match(r"\[([^\]]+)\]\n", block)
         if table[1].startswith("project."):
             continue

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from pentapod.batch.tasks.engine import EngineOptions as EngineOptions
     from pentapod.batch.tasks.store import Input as Input
     from pentapod.batch.tasks.store import Store as Store
-    from pentapod.batch.tasks.task import Row as Row
     from pentapod.batch.tasks.task import Task as Task
 
 _HOMES = {
@@ -29,7 +28,7 @@ _HOMES = {
     "batch.sweep": "Sweep",
     "batch.tasks.engine": "Done Engine EngineOptions",
     "batch.tasks.store": "Input Store",
-    "batch.tasks.task": "Row Task",
+    "batch.tasks.task": "Task",
 }
 
 if not TYPE_CHECKING:  # type checkers read the imports above

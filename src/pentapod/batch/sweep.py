@@ -19,6 +19,7 @@ from pentapod.base.toml import line_of, parsed, read_toml
 from pentapod.base.values import Value
 from pentapod.batch.changes import changed, unknown
 from pentapod.batch.jobs import job_task
+from pentapod.batch.tasks.engine import OPTIONS
 from pentapod.batch.tasks.store import Store
 from pentapod.batch.tasks.task import Task
 from pentapod.job.schema.job import Job
@@ -58,10 +59,10 @@ class Sweep(Value):
     text: str
 
     @classmethod
-    def load(cls, path: str | Path, most: int) -> Sweep:
-        """Return the sweep of a TOML file. most: tasks. Raises InputError: one line with file, key, value and remedy.
+    def load(cls, path: str | Path, most: int = OPTIONS.most) -> Sweep:
+        """Return the sweep of a TOML file. most: largest number of tasks.
 
-        Each combination is checked as a job, and as a machine file, before any of them is run.
+        Raises InputError: one line with file, key, value and remedy.
         """
         path = Path(path)
         text = read_toml(path, "sweep", InputError)
@@ -85,7 +86,7 @@ class Sweep(Value):
         return tuple(self.changes[0])
 
     def tasks(self, store: Store) -> list[Task]:
-        """Return the tasks: each job with each of the changes. Raises InputError as `load`."""
+        """Return the tasks: each job with each of the changes. Raises InputError where one makes no job or machine."""
         found: list[Task] = []
         for job in self.jobs:
             for change in self.changes:

@@ -94,6 +94,7 @@ class Engine:
         self._client: Any = None
         self._mark = f".unfinished-{os.getpid()}-{secrets.token_hex(4)}"
         self._numbers = Counter[str]()
+        self._sent: dict[tuple[str, str], float] = {}
 
     def __enter__(self) -> Self:
         self._open.enter_context(locked(self.folder, make=True))
@@ -144,9 +145,12 @@ class Engine:
         future.add_done_callback(answered.put)
         return future
 
-    def send(self, answer: Answer) -> None:
-        """Send the inputs that a worker misses to it. It may die meanwhile."""
+    def send(self, answer: Answer, since: float) -> None:
+        """Send the inputs that a worker missed to it, unless they were sent `since` then. It may die meanwhile."""
         for each in answer.missing:
+            if self._sent.get((answer.worker, each.name), -1.0) >= since:
+                continue
+            self._sent[answer.worker, each.name] = time.monotonic()
             data = (self.folder / INPUTS / each.name).read_bytes()
             self._client.run(receive, each.name, each.sha256, data, workers=[answer.worker], on_error="ignore")
 
@@ -177,7 +181,7 @@ class _Rounds:
     def __init__(self, engine: Engine, tasks: Sequence[Task]) -> None:
         self._engine, self._options, self._tasks = engine, engine.options, tasks
         self._answered: SimpleQueue[Any] = SimpleQueue()
-        self._running: dict[str, tuple[Any, Task]] = {}
+        self._running: dict[str, tuple[Any, Task, float]] = {}
         self._alone: deque[Task] = deque()
         self._lost = Counter[str]()
 
@@ -194,17 +198,17 @@ class _Rounds:
                 except Empty:
                     self._engine.check()
                     continue
-                task = self._running.pop(future.key)[1]
+                _, task, since = self._running.pop(future.key)
                 answer = self._answer(future)
                 future.release()
-                if (done := self._taken(task, answer)) is not None:
+                if (done := self._taken(task, answer, since)) is not None:
                     yield done
         finally:
-            self._engine.cancel([future for future, _ in self._running.values()])
+            self._engine.cancel([future for future, _, _ in self._running.values()])
 
     def _start(self, task: Task, worker: str | None = None) -> None:
         future = self._engine.submit(task, self._answered, worker)
-        self._running[future.key] = (future, task)
+        self._running[future.key] = (future, task, time.monotonic())
 
     def _answer(self, future: Any) -> Answer:
         """Return the answer of a future that has ended. Raises InputError where the scheduler is gone."""
@@ -220,11 +224,11 @@ class _Rounds:
                 return Answer("", crashed=f"{type(error).__name__}: {error}")
         return Answer("", died="its worker died")
 
-    def _taken(self, task: Task, answer: Answer) -> Done | None:
+    def _taken(self, task: Task, answer: Answer, since: float) -> Done | None:
         """Return a task that is done; None where it is run again."""
         engine, folder = self._engine, self._engine.folder / task.name
         if answer.missing:
-            engine.send(answer)
+            engine.send(answer, since)
             self._start(task, answer.worker)
             return None
         if answer.row is not None:
