@@ -59,7 +59,8 @@ class Batch(Iterator[Done]):
                     rows[done.task.name] = done.columns
                     yield done
             finally:
-                write_results(tasks, rows, keys, title, engine.folder, parquet=self._parquet)
+                if rows:
+                    write_results(tasks, rows, keys, title, engine.folder, parquet=self._parquet)
 
 
 def batch(

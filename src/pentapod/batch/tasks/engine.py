@@ -23,6 +23,7 @@ from pentapod.batch.tasks.store import INPUTS, Store
 from pentapod.batch.tasks.task import Row, Task, versions
 from pentapod.batch.tasks.worker import Answer, Order, execute, receive
 from pentapod.job.run_folder import locked, remove_unfinished
+from pentapod.numerics.threads import cores
 
 LOG = "log.jsonl"
 """What happened when, and where: a line for each answer of a worker. No table depends on it."""
@@ -34,12 +35,14 @@ class EngineOptions:
 
     memory: bytes that the process of a task may use; a task that needs more counts as crashed. tries: runs beside
     others of a task whose process or worker died, before it is run alone. alone: runs alone of such a task, before it
-    counts as crashed. tick: seconds between two looks whether the scheduler is there. most: largest number of tasks.
+    counts as crashed. sends: how often inputs of a task are sent to workers that miss them. tick: seconds between two
+    looks whether the scheduler is there. most: largest number of tasks.
     """
 
     memory: float = 4e9
     tries: int = 2
     alone: int = 2
+    sends: int = 20
     tick: float = 1.0
     most: int = 10_000
 
@@ -127,7 +130,7 @@ class Engine:
                 missing.append(task)
         if missing:
             if self._client is None:
-                count = None if self._scheduler else min(self._workers or os.cpu_count() or 1, len(missing))
+                count = None if self._scheduler else min(self._workers or cores(), len(missing))
                 self._client = self._open.enter_context(client_of(self._scheduler, count))
             yield from _Rounds(self, missing).done()
 
@@ -183,7 +186,7 @@ class _Rounds:
         self._answered: SimpleQueue[Any] = SimpleQueue()
         self._running: dict[str, tuple[Any, Task, float]] = {}
         self._alone: deque[Task] = deque()
-        self._lost = Counter[str]()
+        self._lost, self._sends = Counter[str](), Counter[str]()
 
     def done(self) -> Iterator[Done]:
         """Yield the tasks as they end."""
@@ -227,7 +230,8 @@ class _Rounds:
     def _taken(self, task: Task, answer: Answer, since: float) -> Done | None:
         """Return a task that is done; None where it is run again."""
         engine, folder = self._engine, self._engine.folder / task.name
-        if answer.missing:
+        if answer.missing and self._sends[task.name] < self._options.sends:
+            self._sends[task.name] += 1
             engine.send(answer, since)
             self._start(task, answer.worker)
             return None
@@ -236,7 +240,7 @@ class _Rounds:
                 self._place(answer.packed, folder)
             engine.log(task, answer, str(answer.row["status"]))
             return Done(task, answer.row, folder, new=True, seconds=answer.seconds)
-        cause = answer.crashed
+        cause = "its inputs cannot be sent to the workers" if answer.missing else answer.crashed
         if not cause:
             engine.log(task, answer, "died")
             self._lost[task.name] += 1
