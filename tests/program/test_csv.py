@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from pentapod.base.errors import InputError, ProgramError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS
+from pentapod.numerics.kernels import kernels_used
 from pentapod.program import Program, Provenance, quantised, read_csv, write_csv
 from pentapod.toolpath.linking.partition import Piece
 
@@ -74,8 +75,11 @@ def test_reading_gives_back_every_bit(tmp_path_factory, seed, rows, period, size
         placement=RigidTransform(rotation(seed), translation),
         provenance=Provenance(*names),
     )
-    after = read_csv(write_csv(before, path))
+    with kernels_used("never"):
+        after = read_csv(write_csv(before, path))
     same(before, after)
+    with kernels_used("always"):
+        same(before, read_csv(path))
     first = path.read_bytes()
     write_csv(after, path)
     assert path.read_bytes() == first
@@ -124,6 +128,21 @@ def test_carriage_returns_of_another_system_are_read(tmp_path):
     path = write_csv(before, tmp_path / "p.csv")
     path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
     same(before, read_csv(path))
+    with kernels_used("always"):
+        same(before, read_csv(path))
+
+
+@pytest.mark.parametrize(
+    "text", ["500.123456789012345678", "5.00e2", "+500.25", "00000000000500.25", "500.", "500", " 500.5"]
+)
+def test_a_number_is_read_as_float_reads_it_however_it_is_written(tmp_path, text):
+    path = write_csv(program(), tmp_path / "p.csv")
+    lines = path.read_text(encoding="utf-8").splitlines()
+    time, _, rest = lines[-1].split(",", 2)
+    path.write_text("\n".join([*lines[:-1], f"{time},{text},{rest}"]) + "\n", encoding="utf-8")
+    for policy in ("never", "always"):
+        with kernels_used(policy):
+            assert read_csv(path).legs[-1, 0] == quantised(np.full(5, 1e-3 * float(text)))[0]
 
 
 # Corrupt files: each is refused by name, with file and line
@@ -245,8 +264,9 @@ BAD = {
 }
 
 
+@pytest.mark.parametrize("kernels", ["never", "always"])
 @pytest.mark.parametrize("name", BAD)
-def test_corrupt_files_are_refused_by_name_and_place(tmp_path, name):
+def test_corrupt_files_are_refused_by_name_and_place(tmp_path, name, kernels):
     corrupt, message, line = BAD[name]
     good = program(placement=RigidTransform(np.eye(3), [0.1, 0.2, 0.3]))
     path = write_csv(good, tmp_path / "program.csv")
@@ -254,7 +274,7 @@ def test_corrupt_files_are_refused_by_name_and_place(tmp_path, name):
     bad = corrupt(data)
     assert bad != data
     path.write_bytes(bad)
-    with pytest.raises(ProgramError) as caught:
+    with kernels_used(kernels), pytest.raises(ProgramError) as caught:
         read_csv(path)
     assert message in str(caught.value)
     assert "program.csv" in str(caught.value)
@@ -301,7 +321,7 @@ def test_blocks_of_little_more_than_a_row_find_the_same(tmp_path, monkeypatch, n
     good = program(placement=RigidTransform(np.eye(3), [0.1, 0.2, 0.3]))
     path = write_csv(good, tmp_path / "program.csv")
     same(good, read_csv(path))
-    test_corrupt_files_are_refused_by_name_and_place(tmp_path, name)
+    test_corrupt_files_are_refused_by_name_and_place(tmp_path, name, "always")
 
 
 def test_a_header_that_promises_too_much_takes_no_memory(tmp_path):

@@ -68,6 +68,16 @@ def test_limit_uses_are_extrema_of_the_interpolation(interpolation):
     assert "segment 0" in str(found["feed"])
 
 
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+def test_limit_uses_of_a_long_program_are_found_part_by_part(interpolation, monkeypatch):
+    m = machine(interpolation=interpolation)
+    trajectory = timed(raster(lines=2, feed=0.2), m)
+    tool = {"max_tip_acceleration": 2.0, "max_tip_jerk": 70.0, "max_axis_velocity": 3.0, "max_axis_acceleration": 9.0}
+    whole = certify(trajectory, limited(m, **tool))
+    monkeypatch.setattr("pentapod.timing.certificates.AT_ONCE", 61)
+    assert certify(trajectory, limited(m, **tool)) == whole
+
+
 def test_certified_feed_is_that_of_the_given_tips():
     """Tips on a circle, started at once: the spline overshoots between the first rows, to the maximum of a quartic."""
     m = machine(interpolation="cubic")

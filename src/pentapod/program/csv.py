@@ -12,7 +12,7 @@ import numpy as np
 from pentapod.base.errors import ProgramError
 from pentapod.base.files import atomic_write
 from pentapod.base.refusal import stage
-from pentapod.program.csv_rows import TimeCheck, columns_of, read_rows
+from pentapod.program.csv_rows import TimeCheck, columns_of, read_rows, rows_text
 from pentapod.program.header import MAGIC, Header, header_text, parse_header
 from pentapod.program.program import FORMAT_VERSION, Program
 from pentapod.program.resolution import MM_DECIMALS, to_millimetres
@@ -62,14 +62,12 @@ def read_header(path: str | Path) -> Header:
 
 def _pieces(program: Program) -> Iterator[bytes]:
     """Yield the file in pieces, so that a long program is never in memory as text as a whole."""
-    decimals = _time_decimals(program.period)
-    row = f"%.{decimals}f" + f",%.{MM_DECIMALS}f" * program.legs.shape[1] + "\n"
     yield (header_text(program) + columns_of(program.legs.shape[1]) + "\n").encode()
+    decimals = np.array([_time_decimals(program.period), *[MM_DECIMALS] * program.legs.shape[1]])
     for start in range(0, len(program.legs), ROWS_AT_ONCE):
         legs = to_millimetres(program.legs[start : start + ROWS_AT_ONCE])
         times = np.arange(start, start + len(legs)) * program.period
-        table = np.column_stack([times, legs])
-        yield ((row * len(table)) % tuple(table.ravel().tolist())).encode()
+        yield rows_text(np.column_stack([times, legs]), decimals)
 
 
 def _time_decimals(period: float) -> int:

@@ -16,6 +16,9 @@ from pentapod.timing.limits.limits import machine_limits
 from pentapod.timing.path.setpoints import InterpolatedSetpoints, SetpointRows, spline_padding
 from pentapod.timing.time_law.trajectory import Trajectory
 
+AT_ONCE = 1 << 16
+"""Intervals that are measured together: a few hundred bytes each."""
+
 
 @dataclass(frozen=True)
 class LimitUse(Value):
@@ -84,13 +87,21 @@ def certify(
     setpoints = InterpolatedSetpoints(
         rows, trajectory.path.pieces[trajectory.indices[0]], period, interpolation, first, count
     )
+    largest: list[Reading | None] = [None] * len(limits)
+    for start, part in setpoints.parts(AT_ONCE):
+        for k, limit in enumerate(limits):
+            if isinstance(limit, Feed):
+                own = times[start : start + part.count + 1]
+                found = _feed(trajectory, machine, part, own, spot, of_tip=given is not None)
+            elif any(limit is one for one in trajectory.limits):
+                found = _piecewise(limit, trajectory, part, start)
+            else:
+                found = limit.largest(part)
+            known = largest[k]
+            if found is not None and (known is None or found.value / found.bound > known.value / known.bound):
+                largest[k] = replace(found, row=found.row + start)
     uses: list[LimitUse] = []
-    for limit in limits:
-        if isinstance(limit, Feed):
-            found = _feed(trajectory, machine, setpoints, times, spot, of_tip=given is not None)
-        else:
-            added = any(limit is one for one in trajectory.limits)
-            found = _piecewise(limit, trajectory, setpoints) if added else limit.largest(setpoints)
+    for limit, found in zip(limits, largest, strict=True):
         if found is not None:
             leg = found.index + 1 if limit.of_legs else None
             where = (float(times[found.row]), float(stations[found.row]), int(segments[found.row]))
@@ -138,12 +149,18 @@ def _feed(
     return Reading(share * float(slower[row]), float(slower[row]), row, 0)
 
 
-def _piecewise(limit: Limit, trajectory: Trajectory, setpoints: InterpolatedSetpoints) -> Reading | None:
-    """Return the largest share of a limit that depends on the path, judged piece by piece."""
+def _piecewise(limit: Limit, trajectory: Trajectory, setpoints: InterpolatedSetpoints, start: int) -> Reading | None:
+    """Return the largest share of a limit that depends on the path, judged piece by piece.
+
+    start: number of the first interval of these setpoints.
+    """
     found: list[Reading] = []
-    starts = np.minimum(np.rint(trajectory.starts / setpoints.period).astype(int), setpoints.count)
-    starts[0] = 0
-    for index, low, high in zip(trajectory.indices, starts[:-1].tolist(), starts[1:].tolist(), strict=True):
+    starts = np.rint(trajectory.starts / setpoints.period).astype(int) - start
+    starts[0] = -start
+    for index, begin, end in zip(trajectory.indices, starts[:-1].tolist(), starts[1:].tolist(), strict=True):
+        low, high = max(begin, 0), min(end, setpoints.count)
+        if high < low or (high == low and end > begin):
+            continue
         piece, rows = trajectory.path.pieces[index], setpoints.rows.shifted(-float(trajectory.path.starts[index]))
         own = rows.stations[setpoints.first + low : setpoints.first + high + 1]
         np.clip(own, 0.0, piece.length, out=own)

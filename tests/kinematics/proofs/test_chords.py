@@ -8,7 +8,7 @@ from scipy.interpolate import BPoly
 
 from pentapod.base.errors import ArrayError
 from pentapod.kinematics import AsBuiltPentapod, Component, LinearPentapod, prove_chords, prove_tip_tube
-from pentapod.kinematics.proofs.krawczyk_kernels import angle_within
+from pentapod.kinematics.krawczyk.krawczyk_kernels import angle_within
 
 BASE = np.array([[-0.552, -0.229], [-0.312, 0.510], [0.155, 0.577], [0.429, -0.417], [-0.078, -0.563]])
 ROBOT = LinearPentapod.quadratic(BASE, 0.2125)

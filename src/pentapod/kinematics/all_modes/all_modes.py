@@ -60,7 +60,7 @@ def all_poses(
     ArrayError.
     """
     from pentapod.kinematics.all_modes.search_kernels import search  # noqa: PLC0415 - loads numba
-    from pentapod.kinematics.proofs.krawczyk_kernels import ROUND  # noqa: PLC0415
+    from pentapod.kinematics.krawczyk.krawczyk_kernels import ROUND  # noqa: PLC0415
 
     readings = as_floats(legs, "legs")
     if readings.shape != (5,) or not (np.isfinite(readings) & (readings > 0.0)).all():

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.kinematics.proofs.krawczyk_kernels import ROUND
-from pentapod.kinematics.proofs.ring_kernels import norm
+from pentapod.kinematics.krawczyk.krawczyk_kernels import ROUND
+from pentapod.kinematics.krawczyk.ring_kernels import norm
 from pentapod.numerics.kernels import kernel
 
 NEAR, SOUND = 1e-3, 1e-6

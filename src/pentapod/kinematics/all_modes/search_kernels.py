@@ -12,7 +12,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.kinematics.all_modes.linear_kernels import reduced
-from pentapod.kinematics.proofs.krawczyk_kernels import (
+from pentapod.kinematics.krawczyk.krawczyk_kernels import (
     ROUND,
     contracted,
     fill_defect,

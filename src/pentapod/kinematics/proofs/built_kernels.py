@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats
-from pentapod.kinematics.proofs.krawczyk_kernels import ROUND, enclosed, fill_defect, fill_line, invert, sided
+from pentapod.kinematics.krawczyk.krawczyk_kernels import ROUND, enclosed, fill_defect, fill_line, invert, sided
+from pentapod.kinematics.krawczyk.ring_kernels import NEAREST
 from pentapod.kinematics.proofs.newton_kernels import equations, solved
-from pentapod.kinematics.proofs.ring_kernels import NEAREST
 from pentapod.numerics.kernels import kernel
 
 NEIGHBOUR = 5e-3

@@ -73,14 +73,16 @@ class _Prover:
 
     def prove(self, legs: Floats, start: Floats, end: Floats, depth: int) -> Chords:
         """As `prove_chords`; start, end (H, 6)."""
-        from pentapod.kinematics.proofs.chords_kernels import chords  # noqa: PLC0415 - loads numba
+        from pentapod.kinematics.krawczyk.chords_kernels import chords  # noqa: PLC0415 - loads numba
+        from pentapod.kinematics.krawczyk.lane_kernels import LANES  # noqa: PLC0415
 
+        rings = None if self.rings is None else np.tile(self.rings, (LANES, 1, 1))
         count, points = len(legs), len(self.offsets)
         proven, angles = np.empty(count, dtype=np.bool_), np.empty(count)
         deviations, speeds = np.empty((count, points)), np.empty((count, points))
         found = (proven, deviations, angles, speeds, np.empty((count, 5)), np.empty((count, 5, 2)))
         geometry, asked = kernel_geometry(self.robot, legs), (self.signs, self.offsets, self.base_axes, self.bases)
-        chords(np.ascontiguousarray(legs), start, end, geometry, self.rings, *asked, found)
+        chords(np.ascontiguousarray(legs), start, end, geometry, rings, *asked, found)
         answer = Chords(*found)
         if depth > 0:
             self._halve(answer, legs, start, end, depth)

@@ -1,6 +1,6 @@
 """Krawczyk's test on every interval of a program at once, compiled: what `motion` proves, for short intervals.
 
-Arrays as in `krawczyk_kernels` and `chords_kernels`. The boxes are multiples of one shape, so that those of neighbours
+Arrays as in `krawczyk_kernels`. The boxes are multiples of one shape, so that those of neighbours
 contain one another at the pose between them (lemma 10 of docs/proofs.md).
 """
 
@@ -9,14 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats
-from pentapod.kinematics.proofs.chords_kernels import line_corrections, line_residuals, sane
-from pentapod.kinematics.proofs.krawczyk_kernels import (
+from pentapod.kinematics.krawczyk.krawczyk_kernels import (
     ROUND,
     contracted,
     fill_defect,
     fill_line,
     fill_spread,
     invert,
+    line_corrections,
+    line_residuals,
+    sane,
 )
 from pentapod.kinematics.proofs.newton_kernels import solved
 from pentapod.numerics.kernels import kernel

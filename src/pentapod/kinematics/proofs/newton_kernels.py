@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pentapod.base.arrays import Floats
-from pentapod.kinematics.proofs.krawczyk_kernels import fill_line, invert
+from pentapod.kinematics.krawczyk.krawczyk_kernels import fill_line, invert
 from pentapod.numerics.kernels import kernel
 
 TURNS, SETTLED = 12, 1e-6

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import factorial
 from typing import Literal
@@ -11,11 +11,15 @@ from typing import Literal
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.geometry.interpolant import Interpolant
+from pentapod.geometry.interpolant import Interpolant, clamped_slopes
+from pentapod.numerics.blocks import blocks
 from pentapod.timing.path.path import PieceLike
 
 PADDING_ROWS = 16
 """Rows after which the spline no longer depends on where they begin: an influence falls to 0.27 from row to row."""
+
+MARGIN_ROWS = 3
+"""Rows on both sides of some intervals on which what is measured of these depends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +62,18 @@ class SetpointRows:
         """Return the rows with stations `distance` metres further on."""
         return SetpointRows(self.legs, self.stations + distance, self.tips, self.axes)
 
+    def slopes(self) -> SetpointRows:
+        """Return the slopes of the clamped cubic splines through the rows, per row."""
+        tips, axes = (None if y is None else clamped_slopes(y) for y in (self.tips, self.axes))
+        return SetpointRows(clamped_slopes(self.legs), clamped_slopes(self.stations[:, None])[:, 0], tips, axes)
+
 
 @dataclass(frozen=True, eq=False)
 class InterpolatedSetpoints:
     """Setpoints as the controller interpolates them; `count` intervals from row `first` on are judged.
 
-    piece: the one to which these rows belong; stations are counted from its start.
+    piece: the one to which these rows belong; stations are counted from its start. slopes: those of the spline at the
+    rows, per period, where the rows are part of a longer run; else the spline through these rows has them.
     """
 
     rows: SetpointRows
@@ -72,6 +82,21 @@ class InterpolatedSetpoints:
     interpolation: Literal["linear", "cubic"]
     first: int
     count: int
+    slopes: SetpointRows | None = None
+
+    def parts(self, size: int) -> Iterator[tuple[int, InterpolatedSetpoints]]:
+        """Yield the setpoints of at most `size` intervals at a time, and the number of the first of these.
+
+        The polynomials of a long program would fill the memory.
+        """
+        rows = self.rows
+        slopes = rows.slopes() if self.interpolation == "cubic" else None
+        for part in blocks(self.count, size):
+            low = max(self.first + part.start - MARGIN_ROWS, 0)
+            near = slice(low, min(self.first + part.stop + 1 + MARGIN_ROWS, len(rows)))
+            own = None if slopes is None else slopes[near]
+            first, count = self.first + part.start - low, part.stop - part.start
+            yield part.start, replace(self, rows=rows[near], first=first, count=count, slopes=own)
 
     @property
     def own_rows(self) -> slice:
@@ -86,25 +111,28 @@ class InterpolatedSetpoints:
     @cached_property
     def legs(self) -> Interpolant:
         """The legs over time."""
-        return self._through(self.rows.legs)
+        return self._through(self.rows.legs, None if self.slopes is None else self.slopes.legs)
 
     @cached_property
     def station(self) -> Interpolant:
         """The station over time, one column."""
-        return self._through(self.rows.stations[:, None])
+        slopes = None if self.slopes is None else self.slopes.stations[:, None]
+        return self._through(self.rows.stations[:, None], slopes)
 
     @cached_property
     def tip(self) -> Interpolant:
         """The tip over time, where the rows have it."""
-        return self._through(np.asarray(self.rows.tips))
+        return self._through(np.asarray(self.rows.tips), None if self.slopes is None else self.slopes.tips)
 
     @cached_property
     def axis(self) -> Interpolant:
         """The tool axis over time, likewise."""
-        return self._through(np.asarray(self.rows.axes))
+        return self._through(np.asarray(self.rows.axes), None if self.slopes is None else self.slopes.axes)
 
-    def _through(self, rows: Floats) -> Interpolant:
-        return Interpolant.through(rows, self.period, self.interpolation)
+    def _through(self, rows: Floats, slopes: Floats | None) -> Interpolant:
+        if slopes is None:
+            return Interpolant.through(rows, self.period, self.interpolation)
+        return Interpolant.along(rows, slopes, self.period)
 
 
 def spline_padding(piece: PieceLike, speed: float, period: float, *, start: bool, tool: bool = False) -> SetpointRows:

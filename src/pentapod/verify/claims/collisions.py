@@ -64,12 +64,12 @@ def _clear(replay: Replay, *, obstacle: Obstacle, collision_world: CollisionWorl
     tool = collision_world.tool if bars + 1 in columns else ()
     bound = -obstacle.allowance if tool else 0.0
 
-    def gaps(samples: Ints) -> Floats:
+    def gaps(samples: Ints, far: float) -> Floats:
         position, direction = (x[samples] for x in replay.pose)
         bodies = MovingBodies.at(machine, position, direction, frame)
         if tool:
-            return obstacle.surface.bodies(tool, bodies.tips, bodies.axes, TOOL_FAR_M)[0][:, None]
-        return bodies.only(columns).segments(obstacle.surface, FAR_M).distance.reshape(-1, len(columns))
+            return obstacle.surface.bodies(tool, bodies.tips, bodies.axes, min(far, TOOL_FAR_M))[0][:, None]
+        return bodies.only(columns).segments(obstacle.surface, min(far, FAR_M)).distance.reshape(-1, len(columns))
 
     offsets = line_offsets(machine, collision_world.tool)
 
@@ -95,7 +95,7 @@ def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
     """Judge that no leg touches shank or holder."""
     machine, bars = replay.machine, replay.machine.bars.names
 
-    def gaps(samples: Ints) -> Floats:
+    def gaps(samples: Ints, _far: float) -> Floats:
         position, direction = (x[samples] for x in replay.pose)
         return leg_tool_gaps(machine, tool, position, direction)
 

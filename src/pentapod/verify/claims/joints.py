@@ -51,7 +51,7 @@ def within_ranges(replay: Replay) -> Finding | Idle:
     least, most = limb.joint_range
     columns = np.flatnonzero([True, True, True, True, least > 0.0, most < np.pi])  # no angle is below 0 or above π
 
-    def gaps(samples: Ints) -> Floats:
+    def gaps(samples: Ints, _far: float) -> Floats:
         room = limb.room(*(x[samples] for x in replay.pose))
         return np.column_stack([room[:, :4], shortest * room[:, 4:]])[:, columns]
 

@@ -1,15 +1,15 @@
 """Lower bound on the clearance between bodies at all times: branch and bound over stretches of rows.
 
-In the middle of each stretch the gaps are computed. From there no body moves farther than the proven displacement of
-the platform allows (`Robot.enclose`; lemmas 9 and 13 of docs/proofs.md). A stretch that may hold a gap smaller than the
-smallest one found is cut into eight.
+In the middle of each stretch the gaps are computed. From there no body moves farther than the faster end of the
+platform's line does, whose speed is proven; where that could use up a gap, no farther than the legs of the stretch let
+the platform (`Robot.enclose`; lemmas 9 and 13 of docs/proofs.md). A stretch that may hold a gap smaller than the
+smallest one found is cut into four.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -17,18 +17,22 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.numerics.blocks import blocks
 from pentapod.verify.replay.replay import Replay
 
+ROUND_UP = 1.0 + 1e-9
+"""Factor that exceeds the rounding of sums of positive terms."""
+
 
 @dataclass(frozen=True)
 class ClearanceOptions:
     """Options of the search. They change how tight the bound is and what it costs, never whether it holds.
 
-    longest: rows of the first stretches; cuts: into how many pieces one is cut. near_m, near_share: a bound is not
-    tightened where it is this much, in metres or as a share, below a gap that was found. at_once: stretches whose gaps
-    are computed together; enclosed_at_once: stretches whose displacement is.
+    coarsest: rows of the first stretches; cuts: into how many pieces one is cut. longest: rows up to which a stretch is
+    decided though its bound is below a gap that was found, by near_m, in metres, or near_share of that gap. at_once:
+    stretches whose gaps are computed together; enclosed_at_once: stretches whose displacement is.
     """
 
+    coarsest: int = 1024
     longest: int = 64
-    cuts: int = 8
+    cuts: int = 4
     near_m: float = 2e-5
     near_share: float = 0.3
     at_once: int = 4096
@@ -48,8 +52,9 @@ class Displacement:
     joints: Floats | None = None
 
 
-Gaps = Callable[[Ints], Floats]
-"""Gaps (n, C) in metres at samples (n,) of the replay."""
+Gaps = Callable[[Ints, float], Floats]
+"""Gaps (n, C) in metres at samples (n,) of the replay; larger ones than the second argument may be less, but not than
+that."""
 
 Approaches = Callable[[Displacement], Floats]
 """Upper bounds (n, C), metres, on the decrease of those gaps for a displacement of the platform."""
@@ -79,24 +84,29 @@ def clearance_bound(
     offsets (K,): metres along the platform line, of the points whose displacement `approaches` is given.
     """
     count = len(replay.program.legs) - 1
-    size, starts = options.longest, np.arange(0, count, options.longest)
+    size, starts = options.coarsest, np.arange(0, count, options.coarsest)
     met, decided = np.inf, list[ClearanceBound]()
     while True:
         samples = starts + np.minimum(starts + size, count)
-        values = np.concatenate([gaps(samples[part]) for part in blocks(len(samples), options.at_once)])
+        decrease = approaches(travels(replay, starts, size, offsets))
+        values, most = np.empty_like(decrease), decrease.max(axis=1)
+        order = np.argsort(most, kind="stable")
+        for part in (order[part] for part in blocks(len(order), options.at_once)):
+            # A gap that is larger than this cannot be used up.
+            values[part] = gaps(samples[part], max(met, 0.0) + ROUND_UP * float(most[part[-1]]))
+            met = min(met, float(values[part].min()))
         worst = np.unravel_index(int(values.argmin()), values.shape)
-        if values[worst] < met:
-            met = float(values[worst])
-            if met <= bound:
-                return ClearanceBound(met, int(worst[1]), int(samples[worst[0]]), True)
-        if size == options.longest:
-            lower = values - approaches(_first_displacements(replay, starts, offsets, options))
-        else:
-            parts = (starts[part] for part in blocks(len(starts), options.at_once))
-            decreases = [approaches(displacements(replay, part, size, offsets, options)) for part in parts]
-            lower = values - np.concatenate(decreases)
-        target = met - max(options.near_m, options.near_share * (met - bound))
-        again = (lower.min(axis=1) < target) if size > 1 else np.zeros(len(starts), dtype=np.bool_)
+        if values[worst] <= bound:
+            return ClearanceBound(float(values[worst]), int(worst[1]), int(samples[worst[0]]), True)
+        lower, target = values - decrease, met
+        if size <= options.longest:
+            target = met - max(options.near_m, options.near_share * (met - bound)) if size > 1 else -np.inf
+
+            def enclosed(rows: Ints, size: int = size, starts: Ints = starts) -> Floats:
+                return approaches(displacements(replay, starts[rows], size, offsets, options))
+
+            _tighten(lower, values, enclosed, target, met, options.enclosed_at_once)
+        again = lower.min(axis=1) < target
         kept = np.where(again[:, None], np.inf, lower)
         row, column = np.unravel_index(int(kept.argmin()), kept.shape)
         gap = float(kept[row, column])
@@ -108,12 +118,45 @@ def clearance_bound(
         starts = starts[starts < count]
 
 
-def _first_displacements(replay: Replay, starts: Ints, offsets: Floats, options: ClearanceOptions) -> Displacement:
-    """Return the displacements within the longest stretches; claims about the same points share them."""
-    key = ("displacements", options.longest, offsets.tobytes())
-    if key not in replay.shared:
-        replay.shared[key] = displacements(replay, starts, options.longest, offsets, options)
-    return cast("Displacement", replay.shared[key])
+def _tighten(
+    lower: Floats, values: Floats, enclosed: Callable[[Ints], Floats], target: float, met: float, at_once: int
+) -> None:
+    """Raise lower bounds (n, C) of gaps to what the legs allow, `values` less `enclosed`, where that can matter.
+
+    That is where they are below the target, and where they are the least of the others.
+    """
+    least = lower.min(axis=1)
+    order, kept = np.argsort(least, kind="stable"), met
+    for part in blocks(len(order), at_once):
+        rows = order[part]
+        if least[rows[0]] >= max(target, kept):
+            return
+        lower[rows] = np.maximum(lower[rows], values[rows] - enclosed(rows))
+        own = lower[rows].min(axis=1)
+        kept = min(kept, float(own[own >= target].min(initial=np.inf)))
+
+
+def travels(replay: Replay, starts: Ints, size: int, offsets: Floats) -> Displacement:
+    """Return displacements within `size` intervals from each start, from the middle of each, by the speeds of chords.
+
+    Infinite where a chord is not proven. The speeds are of the tip and of the line's faster end; a point in between is
+    displaced as its share of both, one beyond the ends as a lever.
+    """
+    machine, count = replay.machine, len(replay.program.legs) - 1
+    chords = 0.5 * replay.program.period * replay.interval_bounds.speeds[:, [0, 2]]
+    ends = np.minimum(starts + size, count)
+    edges = np.stack([2 * starts, starts + ends, 2 * ends], axis=1).ravel()
+    halves = np.add.reduceat(np.append(chords, np.zeros((1, 2)), axis=0), edges, axis=0).reshape(-1, 3, 2)[:, :2]
+    of_tip, of_ends = ROUND_UP * halves.max(axis=1).T
+    low, tip, high = min(machine.bars.offsets), machine.tool_length, max(*machine.bars.offsets, machine.tool_length)
+    share = np.clip((tip - offsets) / (tip - low), 0.0, 1.0)
+    share = np.where(offsets > tip, 1.0, share)
+    beyond = np.maximum(np.maximum(low - offsets, offsets - high), 0.0) / (high - low)
+    with np.errstate(invalid="ignore"):  # zero times infinity
+        points = of_tip[:, None] * (1.0 - share) + of_ends[:, None] * (share + 2.0 * beyond)
+    points = np.where(np.isfinite(of_tip + of_ends)[:, None], points, np.inf)
+    joints = np.repeat(of_ends[:, None], machine.robot.n_legs, axis=1) if machine.robot.arms.any() else None
+    return Displacement(points, (of_tip + of_ends) / (tip - low), joints)
 
 
 def displacements(

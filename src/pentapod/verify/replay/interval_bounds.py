@@ -17,7 +17,6 @@ from pentapod.geometry.interpolant import Interpolant, clamped_slopes
 from pentapod.kinematics.proof_results import BranchProof, Chords
 from pentapod.kinematics.robot import Poses
 from pentapod.machine.machine import Machine
-from pentapod.numerics.bernstein import split
 from pentapod.numerics.blocks import blocks
 from pentapod.numerics.threads import in_threads
 from pentapod.program.program import Program
@@ -30,7 +29,7 @@ class RunningMaximum:
         self.values: Floats = np.array(-np.inf)
         self.at: Ints = np.array(0, dtype=np.intp)
 
-    def update(self, measured: Floats, first: int) -> None:
+    def update(self, measured: Floats, first: int | Ints) -> None:
         """Add values (n, d) at the places first, first + 1, …; of equal ones the first counts."""
         best = np.argmax(measured, axis=0)
         values = measured[best, np.arange(measured.shape[1])]
@@ -98,6 +97,11 @@ class IntervalBounds:
     platform_open: RunningMaximum = field(default_factory=RunningMaximum)
 
     @property
+    def of_legs(self) -> tuple[RunningMaximum, ...]:
+        """The extremes of the legs' lengths and of their derivatives."""
+        return self.shortest, self.longest, self.rates, self.accelerations, self.jerks
+
+    @property
     def unproven(self) -> Ints:
         """The chords on which the motion is not proven."""
         return np.flatnonzero(~np.isfinite(self.deviations))
@@ -141,7 +145,7 @@ class _Block:
     """What is computed of the intervals of a block."""
 
     intervals: slice
-    wide: Interpolant
+    legs: tuple[Floats, Ints]
     pose: tuple[Floats, Floats]
     proof: BranchProof
     chords: Chords
@@ -157,22 +161,29 @@ class _Block:
         tilt_centre: float,
         leg_error: float,
     ) -> _Block:
+        from pentapod.verify.replay.leg_kernels import extremes, halve  # noqa: PLC0415  loads numba
+
         # One interval more on each side: accelerations and jerks look across the rows.
         low, high = max(intervals.start - 1, 0), min(intervals.stop + 1, len(program.legs) - 1)
         rows = slice(low, high + 1)
-        wide = Interpolant.along(program.legs[rows], None if slopes is None else slopes[rows], program.period)
-        part = Interpolant(wide.bernstein[intervals.start - low : intervals.stop - low], program.period)
-        position, direction = machine.robot.pose(part.halves, program.component)
+        wide = Interpolant.along(program.legs[rows], None if slopes is None else slopes[rows], program.period).bernstein
+        inner = slice(intervals.start - low, intervals.stop - low)
+        part, robot = wide[inner], machine.robot
+        legs = np.full((5, robot.n_legs), -np.inf), np.zeros((5, robot.n_legs), dtype=np.intp)
+        extremes(wide, inner.start, inner.stop, intervals.start, program.period, *legs)
+        halves, samples = np.empty((2 * len(part), *part.shape[1:])), np.empty((2 * len(part) + 1, part.shape[1]))
+        halve(part, halves, samples)
+        position, direction = robot.pose(samples, program.component)
         ends = position[::2], direction[::2]
-        proof = machine.robot.prove(part.bernstein, ends, program.component, leg_error=leg_error)
-        chords = _chords((position, direction), machine, program, part, tilt_centre)
-        return cls(intervals, wide, (position, direction), proof, chords, program.period)
+        proof = robot.prove(part, ends, program.component, leg_error=leg_error)
+        chords = _chords((position, direction), machine, program, halves, tilt_centre)
+        return cls(intervals, legs, (position, direction), proof, chords, program.period)
 
     def add_to(self, found: IntervalBounds) -> None:
         """Add the block to what is found of all intervals."""
         first, last, chords = self.intervals.start, self.intervals.stop, self.chords
-        low = max(first - 1, 0)
-        _legs(found, self.wide, first, slice(first - low, last - low))
+        for measure, values, at in zip(found.of_legs, *self.legs, strict=True):
+            measure.update(values[None], at)
         samples, between = slice(2 * first, 2 * last + 1), slice(2 * first, 2 * last)
         found.position[samples], found.direction[samples] = self.pose
         found.component.update(self.proof, first)
@@ -186,27 +197,15 @@ class _Block:
         found.platform_open.update(-chords.platform_cosines[..., 0], 2 * first)
 
 
-def _legs(found: IntervalBounds, wide: Interpolant, first: int, inner: slice) -> None:
-    """Add the legs on the inner intervals of a block, which begin at the interval `first`."""
-    low, high = wide.ranges
-    found.shortest.update(-low[inner], first)
-    found.longest.update(high[inner], first)
-    found.rates.update(wide.rates[inner], first)
-    found.accelerations.update(wide.accelerations[inner.start : inner.stop + 1], first)
-    found.jerks.update(wide.jerks[inner], first)
-
-
-def _chords(pose: Poses, machine: Machine, program: Program, part: Interpolant, tilt_centre: float) -> Chords:
-    """Return the proofs about the two chords of each interval, between poses (2 m + 1, 3) that are known.
+def _chords(pose: Poses, machine: Machine, program: Program, halves: Floats, tilt_centre: float) -> Chords:
+    """Return the proofs about the chords (n,) between poses (n + 1, 3) that are known.
 
     The points are the tip, the tilt centre, and both ends of the platform's line with the tool.
     """
     tip, heights = machine.tool_length, machine.bars.offsets
-    halves = split(part.bernstein)
-    legs = np.stack(halves, axis=1).reshape(-1, *part.bernstein.shape[1:])
     position, direction = pose
     return machine.robot.prove_chords(
-        legs,
+        halves,
         (position[:-1], direction[:-1]),
         (position[1:], direction[1:]),
         program.component,

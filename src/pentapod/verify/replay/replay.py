@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -74,11 +74,6 @@ class Replay(Value):
     def slopes(self) -> Floats | None:
         """Slopes (N, n_legs) of the legs at the rows, metres a period; None for linear interpolation."""
         return clamped_slopes(self.program.legs) if self.program.interpolation == "cubic" else None
-
-    @cached_property
-    def shared(self) -> dict[Hashable, object]:
-        """Results that several claims use."""
-        return {}
 
     @property
     def pose(self) -> tuple[Floats, Floats]:

@@ -14,13 +14,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.base.units import from_si
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.solids import Solid
 from pentapod.mesh.patch import Patch
+from pentapod.numerics.blocks import in_blocks
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
@@ -100,7 +100,7 @@ def surface_left(replay: Replay) -> Finding | Idle:
         return Idle("the region has no surface")
     found = _left_on(replay, coverage, coverage.region, cutting)
     share, bound = 100.0 * found.missed / area, 100.0 * coverage.share
-    place = replay.place(int(_nearest_samples(replay, found.place[None])[0]))
+    place = replay.place(_nearest_sample(replay, found.place))
     beam = not cutting.cutter
     return Finding(share <= bound, share, bound, "%", place, _method(found, coverage, area, beam=beam))
 
@@ -207,9 +207,10 @@ def _on_cuts(replay: Replay) -> Bools:
     return np.asarray(cutting[np.clip(segment, 0, len(cutting) - 1)])
 
 
-def _nearest_samples(replay: Replay, points: Floats) -> Ints:
-    """Return the samples (N,) whose tilt centres are nearest to points (N, 3)."""
-    return np.asarray(KDTree(replay.tilt_centres).query(points)[1], dtype=np.intp)
+def _nearest_sample(replay: Replay, point: Floats) -> int:
+    """Return the sample whose tilt centre is nearest to a point (3,)."""
+    off = in_blocks(lambda centres: np.square(centres - point).sum(axis=1), replay.tilt_centres)
+    return int(np.argmin(off))
 
 
 def _method(found: _Left, coverage: Coverage, area: float, *, beam: bool) -> str:

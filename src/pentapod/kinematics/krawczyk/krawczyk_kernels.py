@@ -16,12 +16,15 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.kinematics.proofs.ring_kernels import norm, ring_bend, ring_line
+from pentapod.kinematics.krawczyk.ring_kernels import norm, ring_bend, ring_line
 from pentapod.numerics.kernels import kernel
 
 ROUND = 2.0**-46
 """Lemma 4 of docs/proofs.md: a result of fewer than 100 operations on products of size A has a smaller error than this
 times A."""
+
+RING_VALUE, RING_SLOPE = 0.00802, 0.5
+"""Shares of max |ρ'''| by which the quadratic polynomial and its derivative may be off: lemma 15 of docs/proofs.md."""
 
 
 @kernel
@@ -221,3 +224,82 @@ def sided(start: Floats, end: Floats, bound: Floats, signs: Floats, geometry: Fl
     grown = abs(delta) * ((1.0 + bound[5]) * bound[0] + far_x * bound[5] + (1.0 + bound[3]) * bound[2])
     grown += abs(delta) * far_z * bound[3] + bound[2] + abs(lever) * bound[5]
     return w > 4.0 * ROUND and s - grown > 8.0 * ROUND * (1.0 + abs(delta)) * (size + far_x + far_z)
+
+
+@kernel
+def sane(legs: Floats, start: Floats, end: Floats) -> bool:
+    """Return whether there are poses, and lengths that are positive."""
+    total = 0.0
+    for r in range(6):
+        total += start[r] + end[r]
+    for j in range(5):
+        for m in range(legs.shape[1]):
+            if not legs[j, m] > 0.0:
+                return False
+    return bool(np.isfinite(total))
+
+
+@kernel
+def line_residuals(
+    legs: Floats,
+    start: Floats,
+    end: Floats,
+    first: Floats,
+    second: Floats,
+    rings: Floats | None,
+    squares_up: Floats,
+    products: Floats,
+    residual: Floats,
+) -> None:
+    """Fill G along the line (6, 2k + 1): ½ (|D|² − l²) of each leg and ½ (|i|² − 1), as Bernstein coefficients.
+
+    For a ring ½ r² − r ρ is added, with ρ interpolated by a quadratic polynomial from start, middle and end.
+    """
+    for j in range(5):
+        _square(first[j], second[j], squares_up, residual[j])
+        for a in range(len(products)):
+            for b in range(len(products)):
+                residual[j, a + b] -= 0.5 * products[a, b] * legs[j, a] * legs[j, b]
+    _square(start[3:], end[3:], squares_up, residual[5])
+    residual[5] -= 0.5
+    if rings is not None:
+        last = residual.shape[1] - 1
+        for j in range(5):
+            middle = 2.0 * rings[j, 2] - 0.5 * (rings[j, 0] + rings[j, 1])
+            for m in range(last + 1):
+                far = squares_up[0, m] * rings[j, 0] + squares_up[1, m] * middle + squares_up[2, m] * rings[j, 1]
+                residual[j, m] += rings[j, 8] * (0.5 * rings[j, 8] - far)
+
+
+@kernel
+def _square(first: Floats, second: Floats, squares_up: Floats, out: Floats) -> None:
+    """Fill the coefficients (2k + 1,) of ½ |v|², v on the straight line from first to second (3,)."""
+    b0, b1, b2 = (
+        first[0] * first[0] + first[1] * first[1] + first[2] * first[2],
+        first[0] * second[0] + first[1] * second[1] + first[2] * second[2],
+        second[0] * second[0] + second[1] * second[1] + second[2] * second[2],
+    )
+    for m in range(len(out)):
+        out[m] = 0.5 * (squares_up[0, m] * b0 + squares_up[1, m] * b1 + squares_up[2, m] * b2)
+
+
+@kernel
+def line_corrections(
+    inverse: Floats, residual: Floats, size: float, rings: Floats | None, e: Floats, slack: Floats, y: Floats
+) -> None:
+    """Fill e = C G (6, 2k + 1), the error of it by rounding and curved ρ (6,), and bounds (6,) of both at all times."""
+    rounding = ROUND * size * size
+    for r in range(6):
+        slack[r] = 4.0 * ROUND * abs(inverse[r, 5])
+        for n in range(5):
+            slack[r] += rounding * abs(inverse[r, n])
+        if rings is not None:
+            for n in range(5):
+                slack[r] += RING_VALUE * rings[n, 8] * rings[n, 4] * abs(inverse[r, n])
+        y[r] = 0.0
+        for m in range(e.shape[1]):
+            e[r, m] = 0.0
+            for n in range(6):
+                e[r, m] += inverse[r, n] * residual[n, m]
+            y[r] = max(y[r], abs(e[r, m]))
+        y[r] += slack[r]
