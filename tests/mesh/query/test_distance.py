@@ -1,5 +1,8 @@
 """Distances to meshes: against trimesh's closest points on dense samples, and laws that distances obey."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 import trimesh
@@ -9,6 +12,7 @@ from hypothesis import strategies as st
 from pentapod.geometry.solids import Solid
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
+from pentapod.mesh.query.tree import FacetTree
 
 FAR = 0.3
 
@@ -146,3 +150,14 @@ def test_a_mesh_wound_inside_out_has_the_same_inside():
     inverted = MeshDistance.of(Mesh.of(np.asarray(box.vertices), np.asarray(box.faces)[:, ::-1]))
     at = np.random.default_rng(9).uniform(-0.08, 0.08, (100, 3))
     np.testing.assert_allclose(inverted.points(at).distance, MeshDistance.of(mesh_of(box)).points(at).distance)
+
+
+def test_tree_of_a_mesh_is_made_once_and_goes_with_it():
+    mesh = mesh_of(trimesh.creation.box((0.011, 0.012, 0.013)))
+    tree = FacetTree.of(mesh)
+    assert MeshDistance.of(mesh).tree is tree
+    assert FacetTree.of(Mesh.of(2.0 * mesh.vertices, mesh.faces)) is not tree
+    gone = weakref.ref(tree)
+    del mesh, tree
+    gc.collect()
+    assert gone() is None

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -85,7 +86,8 @@ class MeshDistance:
         tree = FacetTree.of(mesh)
         found = mesh.diagnosis
         closed = found.watertight and found.consistent
-        features = _features(mesh)[tree.facets] * (-1.0 if found.inverted else 1.0) if closed else None
+        features = _features(mesh, tree) if closed else None
+        features = -features if features is not None and found.inverted else features
         return cls(mesh, tree, features, mesh.bounds)
 
     @property
@@ -113,7 +115,7 @@ class MeshDistance:
     @cached_property
     def _outward(self) -> Floats:
         """Features as in `features`, of an open sheet too."""
-        return _features(self.mesh)[self.tree.facets] if self.features is None else self.features
+        return _features(self.mesh, self.tree) if self.features is None else self.features
 
     def segments(self, starts: ArrayLike, ends: ArrayLike, within: float = np.inf) -> Gap:
         """Return the distances, capped at `within`, of segments from starts to ends (M, 3).
@@ -210,8 +212,19 @@ class MeshDistance:
         return np.minimum(gaps.distance[flat], 0.0), places[rows, worst], gaps.normal[flat]
 
 
-def _features(mesh: Mesh) -> Floats:
-    """Return normals (F, 7, 3) of facets, of the sides opposite corners 0, 1, 2, and of corners 0, 1, 2."""
+_FEATURES: WeakKeyDictionary[FacetTree, Floats] = WeakKeyDictionary()
+"""See `_features`: made once for each tree."""
+
+
+def _features(mesh: Mesh, tree: FacetTree) -> Floats:
+    """Return normals (F, 7, 3) of the tree's facets, of the sides opposite corners 0, 1, 2, and of corners 0, 1, 2."""
+    if tree not in _FEATURES:
+        _FEATURES[tree] = _features_of(mesh)[tree.facets]
+    return _FEATURES[tree]
+
+
+def _features_of(mesh: Mesh) -> Floats:
+    """Return the same in the order of the mesh."""
     facets, count = mesh.facet_normals, len(mesh.faces)
     sides = np.zeros((3 * count, 3))
     first, second = mesh.topology.side_pairs

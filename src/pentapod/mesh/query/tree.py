@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -37,7 +38,9 @@ class FacetTree:
 
     @classmethod
     def of(cls, mesh: Mesh) -> FacetTree:
-        """Return the tree of a mesh's facets."""
+        """Return the tree of a mesh's facets, made once for each mesh."""
+        if (known := _MADE.get(mesh)) is not None:
+            return known
         from pentapod.mesh.query.box_kernels import fit_boxes, split_by_medians  # noqa: PLC0415 - loads numba
 
         order = np.arange(len(mesh.faces), dtype=np.intp)
@@ -47,7 +50,8 @@ class FacetTree:
         corners = np.ascontiguousarray(mesh.vertices[mesh.faces[order]])
         boxes = np.empty((2 * leaves - 1, 15))
         fit_boxes(corners, starts, boxes)
-        return cls(corners, order, boxes, starts)
+        _MADE[mesh] = cls(corners, order, boxes, starts)
+        return _MADE[mesh]
 
     @cached_property
     def extents(self) -> Floats:
@@ -112,3 +116,7 @@ def _spread(numbers: Ints) -> Ints:
     ):
         x = (x | x << shift) & mask
     return x
+
+
+_MADE: WeakKeyDictionary[Mesh, FacetTree] = WeakKeyDictionary()
+"""A million facets take more than a second; toolpath, planner, verdict and report ask for the tree of one mesh."""

@@ -10,7 +10,7 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.base.units import from_si
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.query.distance import MeshDistance
+from pentapod.mesh.query.tree import FacetTree
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.toolpath.toolpath import SegmentKind
 
@@ -40,7 +40,8 @@ def touch_off_points(mesh: Mesh, placed: PlacedPath, machine: Machine) -> list[T
     if not len(rows):
         return []
     back = placed.placement.transform.inverse()
-    feet = MeshDistance.of(mesh).feet(back.apply(placed.tilt_centres[rows])).points
+    centres = back.apply(placed.tilt_centres[rows])
+    feet = centres - FacetTree.of(mesh).closest(centres)[1]
     tips, axes = placed.tips[rows], placed.axes[rows]
     legs = machine.robot.leg_lengths(tips + machine.tool_length * axes, -axes)
     there = placed.placement.transform.apply(feet)
