@@ -8,10 +8,12 @@ from itertools import islice
 
 import numpy as np
 
+from pentapod.base.refusal import Shortfall
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.numerics.threads import on_one_thread
+from pentapod.planning.diagnosis import diagnose
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.common_axes import OPTIONS as COMMON_AXES
 from pentapod.planning.placement.common_axes import directions
@@ -49,6 +51,12 @@ class Estimate:
     def margin(self) -> float:
         """The smallest margin of the candidate."""
         return self.candidate.smallest
+
+    @property
+    def shortfalls(self) -> tuple[Shortfall, ...]:
+        """The limits that the candidate exceeds, the worst first; waypoints count the samples."""
+        margins = self.candidate.margins
+        return diagnose(best_tilted_margins(self.samples, margins, self.candidate.transform)[0], margins, NEEDED_MARGIN)
 
 
 Start = tuple[float, PlacementProblem, Margins, RigidTransform]

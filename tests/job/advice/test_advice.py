@@ -7,6 +7,7 @@ import json
 import signal
 import tomllib
 
+import numpy as np
 import pytest
 
 from pentapod.base.errors import JobError
@@ -147,7 +148,22 @@ def test_a_trial_whose_search_for_a_placement_is_interrupted_ends(tmp_path):
 
 def test_nothing_that_works_is_told(tmp_path):
     tried = ("the planner chooses the placement", "a smaller part.scale")
-    assert Advised((), tried).sentence == f"Tried, by estimate or plan: {'; '.join(tried)}: none works"
+    words = f"Tried, by estimate or plan: {'; '.join(tried)}: none works"
+    assert Advised((), tried).sentence == words
+    assert Advised((), tried, reasons=("legs touch",)).sentence == f"{words}. Legs touch"
+
+
+def test_a_part_far_too_large_gets_a_box_within_reach(tmp_path):
+    def passes(job: Job, _) -> bool:
+        planned.append(job)
+        return True
+
+    planned: list[Job] = []
+    found = searched(tmp_path, "plate of 3 x 2 m", passes, points=32, halvings=2)
+    assert found.advice[0].words == "only what lies in a box"
+    low, high = np.array(planned[0].part.region_box_mm)
+    assert ((high - low)[:2] > 50.0).all()
+    assert ((high - low)[:2] < 500.0).all()
 
 
 def test_advice_in_toml():

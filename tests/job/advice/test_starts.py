@@ -34,6 +34,13 @@ def test_the_first_start_is_what_is_wrong(name, tmp_path):
     assert len(job_toolpath(first.job, first.mesh, machine=machine)[0]) > 2
 
 
+def test_a_part_beyond_the_reach_is_begun_with_as_it_is(tmp_path):
+    """All of its toolpath is not made for that: it would be too fine, or take minutes."""
+    job = Job.load(REFUSED["plate of 3 x 2 m"].write(tmp_path))
+    (own,) = starts(job, job_machine(job), job_mesh(job), OPTIONS, has_toolpath=False)
+    assert own.changes == {}
+
+
 def test_cuts_of_a_file_that_gouge_are_lifted_before_anything_else_is_tried(tmp_path):
     job = Job.load(REFUSED["toolpath from a file, leaning"].write(tmp_path))
     machine, mesh = job_machine(job), job_mesh(job)

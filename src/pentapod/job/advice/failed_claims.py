@@ -23,7 +23,8 @@ from pentapod.geometry.polyline import spaced
 from pentapod.job.advice.axes import Changes
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.parts import Regions
-from pentapod.job.advice.trials import Tell, Trial, merged
+from pentapod.job.advice.settings import Tell, merged
+from pentapod.job.advice.trials import Trial
 from pentapod.job.build.specification import job_coverage
 from pentapod.job.build.tool import job_tool
 from pentapod.job.build.toolpath import drops_gouges, job_toolpath

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError
 from pentapod.base.units import from_si
 from pentapod.cutters.tool import Tool
@@ -54,30 +56,81 @@ class Regions:
         found = self._smaller({"region_angle_deg": degrees}, f"only where it is flatter than {degrees:g} deg")
         return found if found is not None and found.share < self.options.most else None
 
+    @cached_property
+    def _extents(self) -> Floats:
+        """Lowest and highest coordinates (2, 3) of the region, metres."""
+        patch = Patch.of(self.mesh, job_region(self.job))
+        points = patch.vertices[np.unique(patch.faces)]
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    @cached_property
+    def _middle(self) -> Floats:
+        """Where boxes are about (3,): the middle, or the place of the region that is nearest to it, around a hole."""
+        low, high = self._extents
+        middle, around = 0.5 * (low + high), 0.5 * self.options.hole * float((high - low).max())
+        sketch = Sketch.of_region(self.job, self.mesh, self.tool, self.options.points)
+        if sketch is None:
+            return middle
+        across = np.abs(sketch.contacts - middle)
+        across[:, self._along] = 0.0
+        nearest = int(across.max(axis=1).argmin())
+        return middle if across[nearest].max() <= around else sketch.contacts[nearest]
+
+    @property
+    def _view(self) -> Floats:
+        return normalised(self.job.part.si.region_direction)
+
+    @property
+    def _along(self) -> int:
+        """The axis of the part that is nearest to the region's direction."""
+        return int(np.abs(self._view).argmax())
+
     def boxed(self, share: float, *, deep: bool = False) -> Smaller | None:
-        """Return the part of the region in a box about its middle, with a share of its extents.
+        """Return the part of the region in a box about its middle, with a share of its largest extent.
 
         deep: whether the box is smaller along the region's direction, too, from the top downwards; None for a flat
         region.
         """
-        patch = Patch.of(self.mesh, job_region(self.job))
-        points = patch.vertices[np.unique(patch.faces)]
-        low, high = points.min(axis=0), points.max(axis=0)
-        view = normalised(self.job.part.si.region_direction)
-        along, margin = int(np.abs(view).argmax()), 0.01 * float((high - low).max())
-        middle, half = 0.5 * (low + high), 0.5 * share * (high - low)
-        corners = np.stack([middle - half, middle + half])
-        corners[:, along] = low[along] - margin, high[along] + margin
-        if deep:
-            if high[along] - low[along] < self.options.flat * float((high - low).max()):
-                return None
-            depth = share * (high[along] - low[along])
-            if view[along] > 0.0:
-                corners[0, along] = high[along] - depth
-            else:
-                corners[1, along] = low[along] + depth
+        low, high = self._extents
+        half = 0.5 * np.minimum(high - low, share * float((high - low).max()))
+        corners = np.stack([self._middle - half, self._middle + half])
+        corners[:, self._along] = self._depths(share if deep else None)
+        if deep and self._flat:
+            return None
+        return self._in_box(corners, {}, "only what lies in a box")
+
+    def top(self, share: float) -> Smaller | None:
+        """Return what is flat, and not deeper than a share of the region's depth; None for a flat region."""
+        if self._flat:
+            return None
+        low, high = self._extents
+        corners = np.stack([low, high]) + np.array([[-1.0], [1.0]]) * self._margin
+        corners[:, self._along] = self._depths(share)
+        degrees = min(self.options.top_deg, float(from_si(job_region(self.job).within, "deg")))
+        return self._in_box(corners, {"region_angle_deg": degrees}, "only what is flat at the top")
+
+    @property
+    def _margin(self) -> float:
+        low, high = self._extents
+        return 0.01 * float((high - low).max())
+
+    @property
+    def _flat(self) -> bool:
+        low, high = self._extents
+        return bool((high - low)[self._along] < self.options.flat * (high - low).max())
+
+    def _depths(self, share: float | None) -> Floats:
+        """Return the coordinates (2,) between which a box lies along the region's direction: all, or from the top."""
+        low, high = self._extents[:, self._along]
+        found = np.array([low - self._margin, high + self._margin])
+        if share is not None:
+            depth, upwards = share * (high - low), self._view[self._along] > 0.0
+            found[0 if upwards else 1] = high - depth if upwards else low + depth
+        return found
+
+    def _in_box(self, corners: Floats, keys: dict[str, Any], words: str) -> Smaller | None:
         box = np.round(from_si(corners, "mm"), 1) + 0.0
-        return self._smaller({"region_box_mm": box.tolist()}, "only what lies in a box")
+        return self._smaller({**keys, "region_box_mm": box.tolist()}, words)
 
     def _smaller(self, keys: dict[str, Any], words: str) -> Smaller | None:
         try:

@@ -14,9 +14,10 @@ from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.base.values import Value
 from pentapod.job.advice.failed_claims import FailedClaims
 from pentapod.job.advice.options import AdviceOptions
+from pentapod.job.advice.settings import TOUCHES, Settings, Tell, joined, merged
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.advice.starts import starts
-from pentapod.job.advice.trials import FEWEST, Tell, Trial, Trials, joined, merged
+from pentapod.job.advice.trials import FEWEST, Because, Trial, Trials
 from pentapod.job.build.tool import job_tool
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
@@ -28,17 +29,17 @@ Passes = Callable[[Job, Progress], bool]
 """Plans a job, all stages, and returns whether its verdict passed. Raises KeyboardInterrupt where it is interrupted."""
 
 
-TOUCHES = ("tool body", "the tool touches")
-"""Beginnings of the names of limits and claims that keep shank, stem and holder from the part."""
-
-
 @dataclass(frozen=True)
 class Advised(Value):
-    """What a search for advice found. tried: words for what was estimated or planned. interrupted: by Ctrl-C."""
+    """What a search for advice found. tried: words for what was estimated or planned. interrupted: by Ctrl-C.
+
+    reasons: what stands in the way of all that was tried, in words.
+    """
 
     advice: tuple[Advice, ...]
     tried: tuple[str, ...]
     interrupted: bool = False
+    reasons: tuple[str, ...] = ()
 
     @property
     def sentence(self) -> str:
@@ -49,7 +50,8 @@ class Advised(Value):
             return f"The search was interrupted; tried until then: {'; '.join(self.tried) or 'nothing'}"
         if not self.tried:
             return "Nothing was found to try"
-        return f"Tried, by estimate or plan: {'; '.join(self.tried)}: none works"
+        tried = f"Tried, by estimate or plan: {'; '.join(self.tried)}: none works"
+        return ". ".join((tried, *(reason[:1].upper() + reason[1:] for reason in self.reasons)))
 
 
 def advised(
@@ -70,6 +72,7 @@ def advised(
     """
     found: list[Advice] = []
     tried: dict[str, None] = {}
+    reasons: dict[str, None] = {}
     count, interrupted = options.replans if failed else options.plans, False
 
     def tell(words: str) -> None:
@@ -77,7 +80,7 @@ def advised(
             tried[words] = None
             progress("advice", 0.0, words)
 
-    trials = _trials(job, machine, mesh, toolpath, options, tell)
+    trials = _trials(job, machine, mesh, toolpath, options, tell, lambda words: reasons.update({words: None}))
     if toolpath is not None:
         claims = FailedClaims(job, machine, mesh, toolpath, failed, options, tell)
         touches = any(each.constraint.startswith(TOUCHES) for each in short)
@@ -93,7 +96,7 @@ def advised(
     except KeyboardInterrupt:
         interrupted = True
         progress("advice", 1.0, "interrupted: what was found is kept")
-    return Advised(tuple(found), tuple(tried), interrupted)
+    return Advised(tuple(found), tuple(tried), interrupted, tuple(reasons))
 
 
 def _told(progress: Progress, share: float, words: str, stage: str, fraction: float, note: str = "") -> None:
@@ -110,7 +113,13 @@ def _passes(passes: Passes, job: Job, trial: Trial, progress: Progress) -> bool:
 
 
 def _trials(
-    job: Job, machine: Machine, mesh: Mesh, toolpath: Toolpath | None, options: AdviceOptions, tell: Tell
+    job: Job,
+    machine: Machine,
+    mesh: Mesh,
+    toolpath: Toolpath | None,
+    options: AdviceOptions,
+    tell: Tell,
+    because: Because,
 ) -> Iterator[Trial]:
     """Yield the trials of the jobs to begin with."""
     for start in starts(job, machine, mesh, options, has_toolpath=toolpath is not None):
@@ -123,7 +132,7 @@ def _trials(
             sketch = Sketch.of_toolpath(start.job, start.mesh, tool, path, options.points)
         if sketch is None or len(sketch.contacts) < FEWEST:
             continue
-        trials = Trials(start.job, machine, start.mesh, sketch, options, tell)
+        trials = Trials(Settings(start.job, machine, start.mesh, sketch, options, tell), because)
         for trial in trials.all(own=bool(start.changes)):
             words, changes = joined(start.words, trial.words), merged(start.changes, trial.changes)
             yield replace(trial, words=words, changes=changes, kept=start.kept * trial.kept)

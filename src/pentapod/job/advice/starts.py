@@ -13,6 +13,7 @@ from pentapod.base.errors import InputError
 from pentapod.geometry.directions import normalised
 from pentapod.job.advice.axes import OF_MODES, Changes, taken_out
 from pentapod.job.advice.options import AdviceOptions
+from pentapod.job.build.reach import check_reach
 from pentapod.job.build.region import covers_region, job_region
 from pentapod.job.build.toolpath import job_toolpath, removes_gouges
 from pentapod.job.build.values import job_mesh
@@ -64,11 +65,20 @@ def starts(
     region = RegionShare.of(mesh, job_region(job)).inside > 0.0
     if region:
         yield from _of_other_size(job, machine, mesh, options)
-        if has_toolpath or _has_toolpath(own, machine):
+        if has_toolpath or _is_too_large(own, machine) or _has_toolpath(own, machine):
             yield own
             return
     others = [*_with_other_paths(job, machine, mesh, options), *_with_a_region(job, mesh)]
     yield from (start for start in (others if region else _with_a_region(job, mesh)) if _has_toolpath(start, machine))
+
+
+def _is_too_large(own: Start, machine: Machine) -> bool:
+    """Return whether a region is beyond the machine's reach: no toolpath of all of it is needed."""
+    try:
+        check_reach(own.job, machine, own.mesh)
+    except InputError:
+        return True
+    return False
 
 
 def _has_toolpath(start: Start, machine: Machine) -> bool:

@@ -4,36 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import islice, pairwise
 
 import numpy as np
 
 from pentapod.base.errors import InputError
 from pentapod.base.units import from_si, to_si
-from pentapod.job.advice.axes import AxisChoice, Changes, axis_choices
+from pentapod.job.advice.axes import Changes
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.parts import Regions, Smaller
-from pentapod.job.advice.places import Place, places
-from pentapod.job.advice.sketch import Sketch
-from pentapod.job.build.limits import placement_limits
-from pentapod.job.build.placement import job_weights
-from pentapod.job.build.specification import job_collision_world
-from pentapod.job.build.tool import job_tool
-from pentapod.job.schema.job import Job
-from pentapod.machine.machine import Machine
-from pentapod.mesh.mesh import Mesh
-from pentapod.planning.estimate import Estimate, Estimator
-from pentapod.planning.problem.common_axis import CommonAxis
-from pentapod.planning.problem.constraints import FREE
-from pentapod.planning.problem.problem import PlacementProblem
-from pentapod.planning.problem.samples import ToolpathSamples
-
-Tell = Callable[[str], None]
-"""Takes words for what is tried."""
+from pentapod.job.advice.places import Place
+from pentapod.job.advice.settings import Setting, Settings, joined, merged
+from pentapod.planning.estimate import Estimate
 
 FEWEST = 4
 """Points below which a sketch shows nothing."""
+
+Because = Callable[[str], None]
+"""Takes words for why nothing else is tried, or what stands in the way of all that was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,79 +36,47 @@ class Trial:
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
-    """Tool axes and a placement, and what was estimated for the whole task with them."""
-
-    axis: AxisChoice
-    place: Place
-    found: Estimate
-
-    @property
-    def changes(self) -> Changes:
-        """The changes of the job."""
-        return merged(self.axis.changes, self.place.changes(self.found.candidate.transform))
-
-    @property
-    def words(self) -> str:
-        """What is changed, in words; empty for the job's own setting."""
-        return joined(self.axis.words, self.place.words)
-
-
-@dataclass(frozen=True, eq=False)
 class Trials:
-    """The trials of one job."""
+    """The trials of one job, from estimates for its settings."""
 
-    job: Job
-    machine: Machine
-    mesh: Mesh
-    sketch: Sketch
-    options: AdviceOptions
-    tell: Tell
+    settings: Settings
+    because: Because
 
-    @cached_property
-    def estimator(self) -> Estimator:
-        """Estimates on the machine. Raises JobError where the tool does not go with it."""
-        world = job_collision_world(self.job, self.machine, self.mesh)
-        return Estimator.of(
-            PlacementProblem.of(
-                self.sketch.samples(self.sketch.axes, 0.0), self.machine, FREE, job_weights(self.job),
-                collision_world=world, limits=placement_limits(self.job),
-            )
-        )  # fmt: skip
-
-    @cached_property
-    def places(self) -> list[Place]:
-        """The job's own placements, and wider ones."""
-        return places(self.job, self.machine, self.mesh, self.sketch, self.options)
-
-    @cached_property
-    def axes(self) -> list[AxisChoice]:
-        """The job's own tool axes, and others."""
-        tool = job_tool(self.job, self.machine)
-        return axis_choices(self.job, tool, self.sketch, self.places[0].constraints, self.options)
-
-    @cached_property
-    def looked_at(self) -> list[Setting]:
-        """The settings that were estimated so far."""
-        return []
+    @property
+    def options(self) -> AdviceOptions:
+        """How advice is searched for."""
+        return self.settings.options
 
     def all(self, own: bool) -> Iterator[Trial]:
         """Yield the trials, the best first as far as that is known. own: whether the job as it is counts as one."""
-        yield from self._keeping_all(own)
-        for base in self._bases():
+        settings, too_wide = self.settings, self.settings.share_in_reach(self.settings.sketch) < 1.0
+        if not too_wide:
+            yield from self._keeping_all(own)
+        bases = self._bases()
+        if short := settings.beyond_a_single_place():
+            for base in bases[:1]:
+                yield from self._lengths(base)
+            limits = "; ".join(f"{each.constraint} by {each.shortfall:.3g} {each.unit}" for each in short[:2])
+            self.because(f"no pose of the tool was found, whatever the part: {limits}; it is the machine, or the tool")
+            return
+        for base in bases:
             yield from self._smaller(base)
-        yield from self._scales(self._bases()[0])
+        if bases:
+            yield from self._scales(bases[0])
+        if (nearest := settings.nearest) is not None and (short := nearest.found.shortfalls):
+            words = nearest.words or "the job as it is"
+            self.because(f"{words} came nearest: {short[0].constraint} by {short[0].shortfall:.3g} {short[0].unit}")
 
     def _keeping_all(self, own: bool) -> Iterator[Trial]:
         """Yield changes of tool axes and placement; the cheapest to plan first, once they fit comfortably."""
-        for place in self.places:
+        for place in self.settings.places:
             yield from islice(self._in_place(place, own), self.options.failures)
 
     def _in_place(self, place: Place, own: bool) -> Iterator[Trial]:
         """Yield other tool axes with one placement; those that fit comfortably as soon as they are found."""
         scant: list[Setting] = []
-        for axis in (axis for axis in self.axes if place is self.places[0] or not axis.narrow):
-            setting = self._setting(axis, place)
+        for axis in self.settings.of(place):
+            setting = self.settings.setting(axis, place)
             if not (own or setting.words) or setting.found.margin < self.options.enough:
                 continue
             if setting.found.margin < self.options.comfortable:
@@ -130,16 +86,25 @@ class Trials:
         for setting in sorted(scant, key=lambda s: -s.found.margin):
             yield Trial(setting.words, setting.changes, 1.0, 1.0)
 
-    def _setting(self, axis: AxisChoice, place: Place) -> Setting:
-        self.tell(joined(axis.words, place.words))
-        setting = Setting(axis, place, self._best(axis.kinds(self.sketch), place, None, obstacles=True))
-        self.looked_at.append(setting)
-        return setting
-
     def _bases(self) -> list[Setting]:
-        """Return the settings from which other changes start: the best one, and the job's own."""
-        best, own = max(self.looked_at, key=lambda setting: setting.found.margin), self.looked_at[0]
-        return [own] if best is own else [best, own]
+        """Return the settings from which other changes start: the best one, and the job's own.
+
+        Where the whole task is too wide for one set-up, the first one that fits for a box in its middle.
+        """
+        if (best := self.settings.nearest) is not None:
+            own = self.settings.looked_at[0]
+            return [own] if best is own else [best, own]
+        regions = self._all_regions
+        if regions is None:
+            return []
+        core = regions.boxed(self.options.first * self.settings.usual_share)
+        found = None if core is None else self.settings.first_that_fits(core.sketch)
+        return [] if found is None else [found]
+
+    @property
+    def _all_regions(self) -> Regions | None:
+        settings = self.settings
+        return Regions.of(settings.job, settings.mesh, settings.sketch.tool, self.options)
 
     def _smaller(self, base: Setting) -> Iterator[Trial]:
         """Yield changes that keep less, or need more set-ups or another tool."""
@@ -150,129 +115,93 @@ class Trials:
         yield from (trial for trial in regions if trial.worth < self.options.worth_length)
 
     def _regions(self, base: Setting) -> list[Trial]:
-        """Return the largest smaller regions that fit: flatter ones, and boxes."""
-        regions = Regions.of(self.job, self.mesh, self.sketch.tool, self.options)
+        """Return the largest smaller regions that fit: flatter ones, boxes, and the top where a tool is too wide."""
+        regions = self._all_regions
         if regions is None:
             return []
         found: list[Smaller] = []
-        self.tell("a smaller region_angle_deg")
+        self.settings.tell("a smaller region_angle_deg")
         near: Estimate | None = None
         for degrees in self.options.angles_deg:
             if (smaller := regions.flatter(degrees)) is None:
                 continue
-            near = self._less(base, smaller.sketch, near)
-            if near.margin >= self.options.enough:
+            near = self.settings.less(base, smaller.sketch, near)
+            if near is None:
+                break
+            if self.settings.fits(near):
                 found.append(smaller)
                 break
-        self.tell("a smaller region_box_mm")
+        self.settings.tell("a smaller region_box_mm")
         for deep in (False, True):
-            found += self._boxes(base, regions, deep=deep)
+            found += self._boxes(base, lambda share, deep=deep: regions.boxed(share, deep=deep))
+        if base.touches:
+            self.settings.tell("only the top")
+            found += self._boxes(base, regions.top)
         return [self._of_region(base, smaller) for smaller in found]
 
     def _of_region(self, base: Setting, smaller: Smaller) -> Trial:
         changes, words = merged(base.changes, smaller.changes), joined(smaller.words, base.words)
         return Trial(words, changes, smaller.share, smaller.share)
 
-    def _boxes(self, base: Setting, regions: Regions, *, deep: bool) -> list[Smaller]:
+    def _boxes(self, base: Setting, boxed: Callable[[float], Smaller | None]) -> list[Smaller]:
         """Return about the largest box that fits, by bisection, and a smaller one, in case its plan fails."""
 
         def estimated(share: float, near: Estimate | None) -> Estimate | None:
-            smaller = regions.boxed(share, deep=deep)
-            return None if smaller is None else self._less(base, smaller.sketch, near)
+            smaller = boxed(share)
+            return None if smaller is None else self.settings.less(base, smaller.sketch, near)
 
-        fits = self._largest(estimated, self.options.first)
+        fits = self.settings.largest(estimated, self.options.first)
         if fits == 0.0:
             return []
-        boxes = (regions.boxed(factor * fits, deep=deep) for factor in (self.options.spare, self.options.smaller))
+        boxes = (boxed(factor * fits) for factor in (self.options.spare, self.options.smaller))
         return [box for box in boxes if box is not None]
 
     def _setups(self, base: Setting) -> Iterator[Trial]:
         """Yield the smallest number of set-ups whose slabs fit."""
         if not base.place.constraints.moves:
             return
-        self.tell("more placement.setups")
+        settings, contacts = self.settings, self.settings.sketch.contacts
+        settings.tell("more placement.setups")
         for count in self.options.setups:
-            for along in np.argsort(-np.ptp(self.sketch.contacts, axis=0))[:2].tolist():
-                at = self.sketch.contacts[:, along]
+            for along in np.argsort(-np.ptp(contacts, axis=0))[:2].tolist():
+                at = contacts[:, along]
                 borders = pairwise(np.linspace(at.min(), at.max(), count + 1).tolist())
-                parts = [self.sketch.within(low, high, along) for low, high in borders]
+                parts = [settings.sketch.within(low, high, along) for low, high in borders]
                 parts = [part for part in parts if len(part.contacts) >= FEWEST]
-                margins = (self._less(base, part).margin for part in parts)
-                if count > self.job.placement.setups and all(margin >= self.options.enough for margin in margins):
+                fit = (settings.fits(settings.less(base, part)) for part in parts)
+                if count > settings.job.placement.setups and all(fit):
                     changes = merged(base.changes, {"placement": {"setups": count}})
                     yield Trial(joined(f"up to {count} set-ups", base.words), changes, 1.0, 1.0)
                     return
 
     def _lengths(self, base: Setting) -> Iterator[Trial]:
         """Yield the first other tool length that fits."""
-        self.tell("another tool.length_mm")
+        settings = self.settings
+        if settings.share_in_reach(settings.sketch) < 1.0:
+            return
+        settings.tell("another tool.length_mm")
         for share in self.options.lengths:
-            length = round(float(from_si(share * self.machine.tool_length, "mm")))
+            length = round(float(from_si(share * settings.machine.tool_length, "mm")))
             try:
-                other = replace(self, machine=self.machine.with_tool(to_si(length, "mm")))
-                margin = other._less(base, self.sketch).margin
+                other = replace(settings, machine=settings.machine.with_tool(to_si(length, "mm")))
+                found = other.less(base, settings.sketch)
             except InputError:  # the spindle or the holder would not fit
                 continue
-            if margin >= self.options.enough:
+            if settings.fits(found):
                 changes = merged(base.changes, {"tool": {"length_mm": float(length)}})
                 yield Trial(joined(f"a tool of {length} mm", base.words), changes, 1.0, self.options.worth_length)
                 return
 
     def _scales(self, base: Setting) -> Iterator[Trial]:
         """Yield the largest scale that fits, by bisection; it makes another part."""
-        self.tell("a smaller part.scale")
+        settings = self.settings
+        settings.tell("a smaller part.scale")
 
-        def estimated(share: float, near: Estimate | None) -> Estimate:
-            return self._less(base, self.sketch.scaled(share), near, obstacles=False)
+        def estimated(share: float, near: Estimate | None) -> Estimate | None:
+            return settings.less(base, settings.sketch.scaled(share), near, obstacles=False)
 
-        fits = self._largest(estimated, 0.5)
+        fits = settings.largest(estimated, 0.5)
         if fits > 0.0:
             size = self.options.spare * fits
-            changes = merged(base.changes, {"part": {"scale": float(f"{size * self.job.part.scale:.3g}")}})
+            changes = merged(base.changes, {"part": {"scale": float(f"{size * settings.job.part.scale:.3g}")}})
             yield Trial(joined(f"the part at {size:.2g} of its size", base.words), changes, 1.0, 0.0, whole=False)
-
-    def _largest(self, estimated: Callable[[float, Estimate | None], Estimate | None], first: float) -> float:
-        """Return the largest share of the part that fits, by bisection; 0 where none does.
-
-        estimated: takes a share and the estimate before it, None at first, and returns None where nothing is left.
-        """
-        fits, too_large, share, near = 0.0, 1.0, first, None
-        for _ in range(self.options.halvings):
-            found = estimated(share, near)
-            if found is not None and found.margin >= self.options.enough:
-                fits = share
-            else:
-                too_large = share
-            near, share = found or near, 0.5 * (fits + too_large)
-            if share < self.options.least:
-                break
-        return fits
-
-    def _less(self, base: Setting, sketch: Sketch, near: Estimate | None = None, *, obstacles: bool = True) -> Estimate:
-        """Return the estimate for less than the whole task, with axes of the kind that was best for it."""
-        own, kinds = base.found.samples.common_axis, base.axis.kinds(sketch)
-        alike = [each for each in kinds if _cone(each.common_axis) == _cone(own)]
-        return self._best(alike or kinds, base.place, near, obstacles=obstacles)
-
-    def _best(self, kinds: list[ToolpathSamples], place: Place, near: Estimate | None, *, obstacles: bool) -> Estimate:
-        estimator = self.estimator if obstacles else replace(self.estimator, world=None)
-        return estimator.best(kinds, place.constraints, place.component, self.options.comfortable, near)
-
-
-def _cone(common_axis: CommonAxis | None) -> float | None:
-    """Return the cone of axes around a common direction; None where they are the path's own."""
-    return None if common_axis is None else common_axis.cone
-
-
-def joined(*words: str) -> str:
-    """Return words that are not empty, with commas."""
-    return ", ".join(each for each in words if each)
-
-
-def merged(*changes: Changes) -> Changes:
-    """Return several changes as one; later ones win."""
-    found: Changes = {}
-    for each in changes:
-        for table, keys in each.items():
-            found[table] = {**found.get(table, {}), **keys}
-    return found

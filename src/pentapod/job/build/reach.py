@@ -28,8 +28,7 @@ def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
     """
     if not covers_region(job):
         return
-    stepover = getattr(job.toolpath.si, "stepover", None) or 0.0
-    apart = reach(machine) + 2.0 * (2.0 * _tip_distance(job_tool(job)) + stepover)
+    apart = farthest_apart(job, machine)
     if np.linalg.norm(np.ptp(mesh.bounds, axis=0)) <= apart:
         return
     region = Patch.of(mesh, job_region(job))
@@ -50,6 +49,12 @@ def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
         "part", key, f"the part is {size} wide, the work volume {width}",
         expected=f"places to machine that are at most {from_si(apart, 'mm'):,.0f} mm from each other", remedy=remedy,
     )  # fmt: skip
+
+
+def farthest_apart(job: Job, machine: Machine) -> float:
+    """Return a distance of two places of a region, metres, beyond which no set-up reaches both."""
+    stepover = getattr(job.toolpath.si, "stepover", None) or 0.0
+    return reach(machine) + 2.0 * (2.0 * _tip_distance(job_tool(job)) + stepover)
 
 
 def _far_apart(points: Floats, distance: float, most: int) -> int:

@@ -78,13 +78,13 @@ class _Blocks:
     """The blocks of a grid that are looked at: from low (3,) to high (3,), whole groups of them.
 
     cut (3, 2): whether there is more of the grid beyond the lower and the upper side along each axis. view (3,): along
-    which a ball goes from there; None where no side is cut.
+    which a ball goes from there.
     """
 
     low: Ints
     high: Ints
     cut: Bools
-    view: Floats | None
+    view: Floats
 
     @classmethod
     def of(cls, grid: Grid, groups: Ints, window: Window | None) -> _Blocks:
@@ -95,7 +95,7 @@ class _Blocks:
             low = np.clip(np.floor(places[0]).astype(np.intp), 0, groups - 1)
             high = np.clip(np.ceil(places[1]).astype(np.intp), low + 1, groups)
         cut = np.stack([low > 0, high < groups], axis=1)
-        return cls(_GROUP * low, _GROUP * high, cut, window.view if window is not None and cut.any() else None)
+        return cls(_GROUP * low, _GROUP * high, cut, np.zeros(3) if window is None else window.view)
 
     def holds(self, nodes: Ints, axes: Ints, parts: int) -> Bools:
         """Return whether all cells about edges (E,) are among the blocks; nodes (E, 3): the edges' lower ones.
@@ -117,7 +117,7 @@ def _contour(tree: FacetTree, nodes: Nodes, blocks: _Blocks, wide: Bools, distan
     cells, edges = nodes.cells, nodes.edges()
     outside = _reached(tree, nodes, edges, blocks, wide, distance)
     crossed = np.flatnonzero(outside[edges.first] != outside[edges.last])
-    if blocks.view is not None:
+    if blocks.cut.any():
         lower = cells.grid.nodes(nodes.keys[edges.first[crossed]])
         crossed = crossed[blocks.holds(lower, edges.axes[crossed], cells.parts)]
     rows, axes, lengths = edges.first[crossed], edges.axes[crossed], edges.lengths[crossed]
@@ -220,7 +220,7 @@ def _reached(tree: FacetTree, nodes: Nodes, edges: Edges, blocks: _Blocks, wide:
         face[:, axis] += _BLOCK // 2
         index = indices(keys, nodes.cells.grid.keys(nodes.cells.parts * face))
         pairs.append(np.stack([index, len(keys) - 1 + np.maximum(a, b)[one]])[:, index >= 0])
-    if blocks.view is not None:
+    if blocks.cut.any():
         inner = label[1:-1, 1:-1, 1:-1].astype(np.intp)
         pairs.append(_escaping(tree, nodes, blocks, inner, level, beyond))
     joined = np.concatenate(pairs, axis=1)
@@ -236,7 +236,6 @@ def _escaping(tree: FacetTree, nodes: Nodes, blocks: _Blocks, label: Ints, level
     They are nodes on, and connected wide blocks at, cut sides through which the view leads out. label: of the blocks.
     """
     grid, parts, view = nodes.cells.grid, nodes.cells.parts, blocks.view
-    assert view is not None
     places, owners = list[Floats](), list[Ints]()
     at = grid.nodes(nodes.keys)
     for axis in range(3):
