@@ -14,6 +14,7 @@ from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
 from pentapod.machine.clearance.leg_clearance import pair_names
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import TOOL_RESOLUTION_M, MeshDistance
+from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.claims.bodies import clearance
 from pentapod.verify.claims.collisions import body_displacements, claims, line_offsets
 from pentapod.verify.replay.clearance_bounds import Displacement, clearance_bound, displacements
@@ -160,19 +161,20 @@ def searched(gaps, moved, monkeypatch, **bound):
     def displaced(_replay, starts, size, _offsets, _options):
         # From the middle of a stretch, at most half of it away.
         asked.append((starts.copy(), size))
-        return Displacement(np.full((len(starts), 1), 0.5 * size * moved), np.zeros(len(starts)))
+        return Displacement(np.full((len(starts), gaps.shape[1]), 0.5 * size * moved), np.zeros(len(starts)))
 
     def travelled(_replay, starts, size, _offsets):
-        return Displacement(np.full((len(starts), 1), size * moved), np.zeros(len(starts)))
-
-    def capped(at, far):
-        return np.minimum(gaps[at], far)
+        return Displacement(np.full((len(starts), gaps.shape[1]), size * moved), np.zeros(len(starts)))
 
     monkeypatch.setattr("pentapod.verify.replay.clearance_bounds.displacements", displaced)
     monkeypatch.setattr("pentapod.verify.replay.clearance_bounds.travels", travelled)
     path = cases.toolpath_of(cases.strokes()[:1])
-    replay = cases.measured(path, np.zeros((2 * count + 1, 3)), legs=np.full((count + 1, 5), 0.7))
-    found = clearance_bound(replay, capped, lambda by: by.points, np.zeros(1), **bound)
+    replay = cases.measured(path, cases.along_x(np.arange(2 * count + 1)), legs=np.full((count + 1, 5), 0.7))
+
+    def given(poses, far):
+        return np.minimum(gaps[np.round(poses[0][:, 0]).astype(int)], far)
+
+    found = clearance_bound(replay, given, lambda by: by.points, np.zeros(1), **bound)
     return found, asked
 
 
@@ -208,6 +210,33 @@ def test_a_search_ends_where_a_gap_is_met(monkeypatch):
     found, _ = searched(gaps, 1e-7, monkeypatch, bound=-2e-5)
     assert found.gap == pytest.approx(-1e-5, abs=1e-5)
     assert found.gap > -2e-5
+
+
+def along_a_wall(gap, interpolation):
+    """The claim on a shank of 4 mm that moves along a flat wall `gap` metres away, and may be 50 µm inside."""
+    up = np.array([0.0, 0.0, 1.0])
+    parts = [cases.straight(SegmentKind.CUT, cases.FEED, [-4e-3, 0.0, 0.0], [4e-3, 0.0, 0.0], up, count=9)]
+    program = cases.program_of(cases.STAND, *cases.timed(parts), interpolation=interpolation)
+    y = SHANK.low_radius + gap
+    mesh = Mesh.of(np.array([[-0.02, y, 0.0], [0.02, y, 0.0], [0.0, y, 0.02]]), np.array([[0, 1, 2]]))
+    wall = Obstacle("part", MeshDistance.of(mesh), clamped=True, allowance=50e-6)
+    replay = cases.replay_of(cases.good_case(interpolation=interpolation), program, cases.toolpath_of(parts))
+    return judged(replay, wall, (SHANK,))["tool body clear of the part"]
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+@pytest.mark.parametrize("short", [20e-6, 5e-6, 2e-6])
+def test_a_gap_along_a_wall_is_proven_though_the_tool_moves_far_in_a_period(short, interpolation):
+    """At the feed the tool moves by 30 µm in a period."""
+    found = along_a_wall(-50e-6 + short, interpolation)
+    assert found.passed
+    assert found.value == pytest.approx(-0.05 + 1e3 * short, abs=1e3 * short)
+
+
+def test_a_shank_deeper_in_a_wall_than_allowed_is_found():
+    found = along_a_wall(-52e-6, "cubic")
+    assert not found.passed
+    assert found.value == pytest.approx(-0.052, abs=2e-3)
 
 
 class Recording(LinearPentapod):

@@ -6,9 +6,10 @@ from functools import partial
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Floats
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.solids import Solid
+from pentapod.kinematics.robot import Poses
 from pentapod.machine.clearance.collision_world import (
     TOOL_BODY,
     CollisionWorld,
@@ -64,9 +65,8 @@ def _clear(replay: Replay, *, obstacle: Obstacle, collision_world: CollisionWorl
     tool = collision_world.tool if bars + 1 in columns else ()
     bound = -obstacle.allowance if tool else 0.0
 
-    def gaps(samples: Ints, far: float) -> Floats:
-        position, direction = (x[samples] for x in replay.pose)
-        bodies = MovingBodies.at(machine, position, direction, frame)
+    def gaps(poses: Poses, far: float) -> Floats:
+        bodies = MovingBodies.at(machine, *poses, frame)
         if tool:
             return obstacle.surface.bodies(tool, bodies.tips, bodies.axes, min(far, TOOL_FAR_M))[0][:, None]
         return bodies.only(columns).segments(obstacle.surface, min(far, FAR_M)).distance.reshape(-1, len(columns))
@@ -95,9 +95,8 @@ def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
     """Judge that no leg touches shank or holder."""
     machine, bars = replay.machine, replay.machine.bars.names
 
-    def gaps(samples: Ints, _far: float) -> Floats:
-        position, direction = (x[samples] for x in replay.pose)
-        return leg_tool_gaps(machine, tool, position, direction)
+    def gaps(poses: Poses, _far: float) -> Floats:
+        return leg_tool_gaps(machine, tool, *poses)
 
     def approaches(displacement: Displacement) -> Floats:
         both = body_displacements(displacement, tool, len(bars))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Floats
+from pentapod.kinematics.robot import Poses
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.clearance_bounds import Displacement, clearance_bound
 from pentapod.verify.replay.interval_bounds import RunningMaximum
@@ -51,8 +52,8 @@ def within_ranges(replay: Replay) -> Finding | Idle:
     least, most = limb.joint_range
     columns = np.flatnonzero([True, True, True, True, least > 0.0, most < np.pi])  # no angle is below 0 or above π
 
-    def gaps(samples: Ints, _far: float) -> Floats:
-        room = limb.room(*(x[samples] for x in replay.pose))
+    def gaps(poses: Poses, _far: float) -> Floats:
+        room = limb.room(*poses)
         return np.column_stack([room[:, :4], shortest * room[:, 4:]])[:, columns]
 
     def approaches(displacement: Displacement) -> Floats:
