@@ -23,6 +23,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("job",),
     ("report",),
     ("view", "batch"),
+    ("design",),
     ("cli",),
 )
 PLACES = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}

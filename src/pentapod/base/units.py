@@ -16,6 +16,7 @@ _TO_SI: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("deg", "deg_s", "deg_s2"), np.radians),
     "deg_mm": lambda x: np.radians(x) / 1e-3,
     "per_mm": lambda x: x * 1000.0,
+    "n_um": lambda x: x * 1e6,
     **dict.fromkeys(("s", "per_s", "kg", "n", "m_s2"), lambda x: x),
 }
 _FROM_SI: dict[str, Callable[[Any], Any]] = {
@@ -25,6 +26,7 @@ _FROM_SI: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("deg", "deg_s", "deg_s2"), np.degrees),
     "deg_mm": lambda x: np.degrees(x) * 1e-3,
     "per_mm": lambda x: x / 1000.0,
+    "n_um": lambda x: x / 1e6,
 }
 _LONGEST_FIRST = sorted(_TO_SI, key=len, reverse=True)
 

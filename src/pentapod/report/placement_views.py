@@ -19,6 +19,9 @@ from pentapod.report.sheet.dimensions import dimension_lines
 LETTER = 15.0
 """Height of letters in a drawing 500 wide."""
 
+CIRCLE = 73
+"""Points of the circle that bounds a work volume in a drawing."""
+
 _DIMENSIONED = 0.2
 """Share of a drawing's size that its rim takes where it has dimension lines."""
 
@@ -30,7 +33,7 @@ class _Subject:
     facets (F, 3, 3); tips (K, 3); base, joints (n_legs, 3); far, tip, origin (3,).
     arms: which legs end beside the line, and where their arms meet it (m, 3). limb (k, 2, 3): rail and strut.
     hangs: whether the base is above the work, so that the machine's z points down. table: z of its surface, if any.
-    around (G, 3, 3): facets of the fixture; holder: its name.
+    around (G, 3, 3): facets of the fixture; holder: its name. cross: what stands at `origin`; pose: that of the legs.
     """
 
     facets: Floats
@@ -46,6 +49,8 @@ class _Subject:
     table: float | None
     around: Floats
     holder: str
+    cross: str = "origin of the mesh"
+    pose: str = "Legs as at the smallest margin."
 
 
 def placement_views(
@@ -63,6 +68,27 @@ def placement_views(
         + _view(subject, f"from the side: x to the right, {side}", (0, 2))
         + _view(subject, f"the part from above: x to the right, y {y}", (0, 1), close=True)
         + _view(subject, f"the part from the side: x to the right, {side}", (0, 2), close=True)
+    )
+
+
+def machine_views(machine: Machine) -> str:
+    """Return a machine from above and from the side as SVG elements, the tool upright in the middle of its work."""
+    work, hangs = machine.work, bool(machine.work.centre[2] > 0.0)
+    tip, axis = work.centre, np.array([0.0, 0.0, -1.0])
+    turn = np.linspace(0.0, 2.0 * np.pi, CIRCLE)
+    circle = 0.5 * work.diameter * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=-1)
+    half = np.array([0.0, 0.0, 0.5 * work.height])
+    base, joints = leg_ends(machine, tip, axis)
+    beside, heights = arms_beside(machine)
+    none = np.zeros((0, 3, 3))
+    subject = _Subject(
+        none, np.concatenate([tip - half + circle, tip + half + circle]), base, joints,
+        (beside, tip + heights[:, None] * axis), np.concatenate([rails(machine), strut_ends(machine, tip, axis)]),
+        line_top(machine, tip, axis), tip, tip, hangs, None, none, "", "middle of the work volume", "Tool upright.",
+    )  # fmt: skip
+    y, side = ("down", "y towards you") if hangs else ("up", "y away from you")
+    return _view(subject, f"from above: x to the right, y {y}", (0, 1)) + _view(
+        subject, f"from the side: x to the right, {side}", (0, 2)
     )
 
 
@@ -182,7 +208,7 @@ def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool =
         parts += [paper.line(line, QUIET_COLOUR, 2.4) for line in flat(subject.limb)]
         parts += [paper.numbered(joint, k + 1, leg_colour(k)) for k, joint in enumerate(base)]
         parts.append(paper.line(flat(np.stack([subject.far, subject.tip])), "currentColor", 3.0))
-    parts.append(paper.cross(flat(subject.origin), "origin of the mesh"))
+    parts.append(paper.cross(flat(subject.origin), subject.cross))
     if close and len(subject.facets):
         corners = flat(subject.facets).reshape(-1, 2)
         low, high = corners.min(axis=0), corners.max(axis=0)
@@ -192,7 +218,7 @@ def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool =
         parts.append(dimension_lines(paper.at(ends), machine[0], machine[1], paper.unit, names))
     (width, height), extent = paper.size, paper.high - paper.low
     origin = ", ".join(f"{'xyz'[k]} = {round(1e3 * float(subject.origin[k]), 2) + 0.0:.2f}" for k in axes)
-    as_at = "" if close else " Legs as at the smallest margin."
+    as_at = "" if close else f" {subject.pose}"
     return (
         f'<figure><svg viewBox="0 0 {width:.1f} {height:.1f}" role="img" aria-label="{title}">{"".join(parts)}'
         f'</svg><figcaption class="caption">{title}; {extent[0]:.0f} × {extent[1]:.0f} mm. The cross, origin of the '

@@ -1,0 +1,52 @@
+"""pentapod design: search for machines, prove what they keep, write their files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("designs"), show_default=True,
+              help="Folder for the files.")  # fmt: skip
+@click.option("-j", "--workers", type=click.IntRange(1), metavar="N",
+              help="Processes; the result is the same for any number.  [default: one for each core]")  # fmt: skip
+@json_option
+@quiet_option
+def design(file: Path, out: Path, workers: int | None, as_json: bool, quiet: bool) -> int:
+    """Search for machines that DESIGN.toml describes: write front.csv, front.json, design.html and machine files.
+
+    Every design on the front keeps every need in its whole work volume, proven by bounds over all poses, and makes the
+    parts. Needs the extra `design` (pymoo). Ctrl-C and SIGTERM keep what is done: the same command goes on, and
+    ends with the same files. Exit code 1 where no design holds.
+    """
+    from pentapod.design.design_file import DesignFile
+
+    asked = DesignFile.load(file)
+
+    from pentapod.design.members import design_machines
+    from pentapod.design.output import TABLE, folder_of, headline, to_dict, write_front
+    from pentapod.design.workers import worker_processes
+    from pentapod.numerics.threads import cores
+
+    with progress_bar(quiet=quiet or as_json) as progress, worker_processes(workers or cores()) as pool:
+        front = design_machines(asked, out, pool, progress)
+    page = write_front(front, out)
+    if as_json:
+        echo_json({**to_dict(front), "out": str(out)})
+    elif not quiet:
+        lines = [
+            f"{front.designs:,} designs, {len(front.members) + len(front.dropped)} proven, {len(front.members)} hold"
+        ]
+        for number, member in enumerate(front.members, start=1):
+            lines.append(f"  {folder_of(number)}: {headline(front, member)}")
+            lines += [f"    {job}: {said}" for job, _, said in member.parts]
+        lines += [f"  not kept: {'; '.join(member.missing)}" for member in front.dropped]
+        click.echo("\n".join([*lines, f"table: {out / TABLE}", f"page: {page}"]))
+    if not front.members:
+        click.echo("no design holds: weaker needs, wider ranges, or more generations", err=True)
+    return 0 if front.members else 1

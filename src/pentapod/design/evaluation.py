@@ -1,0 +1,105 @@
+"""Evaluation of designs on a sample of poses: a pure function, to be mapped over processes."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.base.values import Value
+from pentapod.design.design_file import DesignFile, Need
+from pentapod.design.figures import in_poses
+from pentapod.design.geometry import rim
+from pentapod.design.part_poses import PartPoses
+from pentapod.design.proof import FORCES, OPTIONS, SHAPE, ProofOptions, dense_poses
+from pentapod.design.quantities import QUANTITIES, sampled
+from pentapod.design.unknowns import Unknowns
+
+ROUNDED_LENGTH, ROUNDED_ANGLE = 1e-4, float(np.radians(0.1))
+"""By how much limits of legs and joints are rounded outwards in a machine's file, at most."""
+FAR = 1e6
+"""In place of what is not finite: a design in which legs have no length, or that is singular."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample(Value):
+    """What designs are evaluated on. unit (N, 5): unit poses of the work volume; parts: poses of parts."""
+
+    unknowns: Unknowns
+    leg_stiffness: float | None
+    unit: Floats
+    parts: PartPoses
+
+
+def first_sample(file: DesignFile, parts: PartPoses) -> Sample:
+    """Return the sample that a search begins with: the rim of the work volume."""
+    return Sample(file.unknowns, file.leg_stiffness, rim(8, 2, 16), parts)
+
+
+def evaluate(sample: Sample, vector: Floats) -> Floats:
+    """Return the quantities of a design (in the order of `QUANTITIES`) on a sample; NaN where one is not known."""
+    design = sample.unknowns.design(vector)
+    with np.errstate(all="ignore"):
+        tips, directions = (
+            np.concatenate(both) for both in zip(design.poses(sample.unit), sample.parts.at(design), strict=True)
+        )
+        found = sampled(design, tips, directions, sample.leg_stiffness)
+    values = np.array([found.get(name, np.nan) for name in QUANTITIES])
+    return np.where(np.isinf(values), FAR, values)
+
+
+def evaluated(sample: Sample, vectors: Floats, pool: Executor | None) -> Floats:
+    """Return the quantities (N, Q) of designs (N, n)."""
+    work = partial(evaluate, sample)
+    found = map(work, vectors) if pool is None else pool.map(work, vectors, chunksize=max(len(vectors) // 8, 1))
+    return np.array(list(found)).reshape(len(vectors), len(QUANTITIES))
+
+
+def shortfalls(needs: tuple[Need, ...], values: Floats, *, reserve: bool = False) -> Floats:
+    """Return by how much designs (N, Q) miss needs (N, needs), in steps of their quantities; at most 0 where kept.
+
+    reserve: keep as much more as a proof may be worse than the worst pose.
+    """
+    names = list(QUANTITIES)
+    columns: list[Floats] = []
+    for need in needs:
+        quantity = QUANTITIES[need.quantity]
+        room = reserve_of(need) if reserve else 0.0
+        value = np.nan_to_num(values[:, names.index(need.quantity)], nan=-need.sense * FAR)
+        columns.append((need.sense * (value - need.bound) + room) / quantity.scale)
+    return np.stack(columns, axis=1) if columns else np.zeros((len(values), 0))
+
+
+def reserve_of(need: Need, options: ProofOptions = OPTIONS) -> float:
+    """Return how much worse than on a dense sample a proven quantity can be, SI."""
+    length, angle = options.length + ROUNDED_LENGTH, options.angle + ROUNDED_ANGLE
+    kinds = {
+        "shortest_leg": length, "longest_leg": length, "stroke": 2.0 * length, "dead_length": 3.0 * length,
+        "base_cone": angle, "platform_least": angle, "platform_most": angle, "clearance": options.clearance,
+        "singular_distance": options.singular,
+    }  # fmt: skip
+    shares = {"amplification": options.force, "sensitivity": options.force, "stiffness": 2.0 * options.force}
+    shares["stroke_ratio"] = 1e-3
+    share = shares.get(need.quantity, 0.0)
+    return options.reserve * (kinds.get(need.quantity, 0.0) + share * abs(need.bound))
+
+
+def worst_poses(sample: Sample, vector: Floats, options: ProofOptions = OPTIONS) -> Floats:
+    """Return unit poses (K, 5) of a dense sample in which a design is worse than on the sample, by a proof's step."""
+    design, unit = sample.unknowns.design(vector), dense_poses(options)
+    axes = design.base_axes()
+    with np.errstate(all="ignore"):
+        here, dense = (in_poses(design, axes, *design.poses(poses)) for poses in (sample.unit, unit))
+    rows: list[int] = []
+    for name, values in dense.items():
+        sense, kind = SHAPE.get(name, (1.0, "force"))
+        if name == "top" or not np.isfinite(values).all():
+            continue
+        step = getattr(options, kind) * (float(np.max(values)) if name in FORCES else 1.0)
+        worst = int(np.argmax(sense * values))
+        if sense * values[worst] > (sense * here[name]).max() + 0.5 * options.reserve * step:
+            rows.append(worst)
+    return unit[sorted(set(rows))]
