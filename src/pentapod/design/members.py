@@ -32,7 +32,8 @@ from pentapod.machine.report.report import check
 
 MACHINE = "machine.toml"
 """Name of a member's machine file."""
-LEAST = ("shortest_leg", "platform_least")
+LIMITS = {"shortest_leg": -1, "longest_leg": 1, "base_cone": 1, "platform_least": -1, "platform_most": 1}
+"""Figures that limits of a machine's legs and joints are for, with their senses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +143,7 @@ def _member(file: DesignFile, sample: Sample, vector: Floats, proof: Proof, part
     dense = completed(design, known, sample.leg_stiffness)
     missing = [_missed(need, proven) for need in file.needs if need.sense * (proven[need.quantity] - need.bound) > 0.0]
     name = f"{file.path.stem}-{hashlib.sha256(vector.tobytes()).hexdigest()[:6]}"
-    text = machine_text(file, design, limits, name)
+    text = machine_text(file, design, limits | _asked(file), name)
     try:
         report = check(read_machine(text, MACHINE))
         missing += [f"{finding.name}: machine check" for finding in report.findings if not finding.passed]
@@ -151,10 +152,15 @@ def _member(file: DesignFile, sample: Sample, vector: Floats, proof: Proof, part
     return Member(vector, proven, dense, proof.boxes, text, tuple(missing))
 
 
+def _asked(file: DesignFile) -> dict[str, float]:
+    """Return the limits of legs and joints that the file gives as needs: so far can they move."""
+    return {need.quantity: need.bound for need in file.needs if LIMITS.get(need.quantity) == need.sense}
+
+
 def _worse(name: str, value: float, parts: dict[str, float]) -> float:
     if name not in parts:
         return value
-    least = name in LEAST or name.endswith(("clearance", "distance")) or name == "top"
+    least = LIMITS.get(name) == -1 or name.endswith(("clearance", "distance")) or name == "top"
     return min(value, parts[name]) if least else max(value, parts[name])
 
 

@@ -92,7 +92,7 @@ def _table(front: Front) -> str:
 def _page(front: Front, path: Path) -> Path:
     file, kept = front.file, len(front.members)
     lead = (
-        f"{front.designs:,} designs were evaluated, the best {kept + len(front.dropped)} went to the proofs, and {kept} "
+        f"After {front.designs:,} evaluations the best {kept + len(front.dropped)} designs went to the proofs, and {kept} "
         "are on the front: they keep every need in the whole work volume, and none is better in everything."
     )
     facts = [

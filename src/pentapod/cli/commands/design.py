@@ -40,7 +40,7 @@ def design(file: Path, out: Path, workers: int | None, as_json: bool, quiet: boo
         echo_json({**to_dict(front), "out": str(out)})
     elif not quiet:
         lines = [
-            f"{front.designs:,} designs, {len(front.members) + len(front.dropped)} proven, {len(front.members)} hold"
+            f"{front.designs:,} evaluations, {len(front.members) + len(front.dropped)} proven, {len(front.members)} hold"
         ]
         for number, member in enumerate(front.members, start=1):
             lines.append(f"  {folder_of(number)}: {headline(front, member)}")
