@@ -92,8 +92,8 @@ def _table(front: Front) -> str:
 def _page(front: Front, path: Path) -> Path:
     file, kept = front.file, len(front.members)
     lead = (
-        f"After {front.designs:,} evaluations the best {kept + len(front.dropped)} designs went to the proofs, and {kept} "
-        "are on the front: they keep every need in the whole work volume, and none is better in everything."
+        f"After {front.designs:,} evaluations the best {kept + len(front.dropped)} designs went to the proofs, and "
+        f"{kept} are on the front: they keep every need in the whole work volume, and none is better in everything."
     )
     facts = [
         ("start", file.machine.name),
@@ -155,10 +155,10 @@ def headline(front: Front, member: Member) -> str:
 
 def _plot(front: Front) -> str:
     """Return the first two objectives of all proven designs as an SVG element; empty where there is one objective."""
-    if len(front.file.objectives) < 2:
+    every = (*front.members, *front.dropped)
+    if len(front.file.objectives) < 2 or not every:
         return ""
     pair = [QUANTITIES[name] for name, _ in front.file.objectives[:2]]
-    every = (*front.members, *front.dropped)
     values = np.array([[q.shown(member.proven[q.name]) for q in pair] for member in every])
     low, high = values.min(axis=0), values.max(axis=0)
     share = (values - low) / np.where(high > low, high - low, 1.0)

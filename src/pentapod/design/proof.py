@@ -90,12 +90,12 @@ def prove(design: Geometry, axes: Floats, options: ProofOptions = OPTIONS) -> Pr
     senses = np.array([sense for sense, _ in shape.values()])
     steps = np.array([getattr(options, kind) for _, kind in shape.values()])
     worst = senses * np.array([found[name] for name in shape])
-    values, worst, count, settled = _bounded(design, axes, _shape, list(shape), senses, worst, steps, options)
+    values, worst, count, settled = _bounded(design, axes, bounds_of_shape, list(shape), senses, worst, steps, options)
     proven = dict(zip(shape, (senses * values).tolist(), strict=True))
     found |= dict(zip(shape, (senses * worst).tolist(), strict=True))
     worst = np.array([found[name] for name in FORCES])
     values, worst, more, also = _bounded(
-        design, axes, _force, list(FORCES), np.ones(2), worst, options.force * worst, options
+        design, axes, bounds_of_forces, list(FORCES), np.ones(2), worst, options.force * worst, options
     )
     proven |= dict(zip(FORCES, values.tolist(), strict=True))
     found |= dict(zip(FORCES, worst.tolist(), strict=True))
@@ -103,7 +103,7 @@ def prove(design: Geometry, axes: Floats, options: ProofOptions = OPTIONS) -> Pr
     return Proof(proven, found, count + more, settled and also)
 
 
-def _shape(boxes: Boxes) -> Floats:
+def bounds_of_shape(boxes: Boxes) -> Floats:
     """Return bounds (N, figures) of the figures of shape, in their order; the greater the worse."""
     bodies, (low, high) = boxes.design.bodies, boxes.platform_cosine
     shortest, longest = boxes.lengths
@@ -121,7 +121,8 @@ def _shape(boxes: Boxes) -> Floats:
     return np.stack(columns, axis=1)
 
 
-def _force(boxes: Boxes) -> Floats:
+def bounds_of_forces(boxes: Boxes) -> Floats:
+    """Return bounds (N, 2) of `FORCES`."""
     return np.stack(boxes.force_bounds(), axis=1)
 
 

@@ -105,9 +105,9 @@ def search(file: DesignFile, folder: Path, pool: Executor | None = None, progres
 
     generation = 0
     while algorithm.has_next():
-        designs = algorithm.ask()
-        judged(designs)
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"):  # its crossover
+            designs = algorithm.ask()
+            judged(designs)
             algorithm.tell(infills=designs)
         generation += 1
         last = generation == asked.generations

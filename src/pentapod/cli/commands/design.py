@@ -39,9 +39,8 @@ def design(file: Path, out: Path, workers: int | None, as_json: bool, quiet: boo
     if as_json:
         echo_json({**to_dict(front), "out": str(out)})
     elif not quiet:
-        lines = [
-            f"{front.designs:,} evaluations, {len(front.members) + len(front.dropped)} proven, {len(front.members)} hold"
-        ]
+        count = len(front.members)
+        lines = [f"{front.designs:,} evaluations; of {count + len(front.dropped)} designs that were tried, {count} hold"]
         for number, member in enumerate(front.members, start=1):
             lines.append(f"  {folder_of(number)}: {headline(front, member)}")
             lines += [f"    {job}: {said}" for job, _, said in member.parts]
