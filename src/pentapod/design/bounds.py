@@ -261,7 +261,7 @@ class Boxes:
             forces[:, axis, :, axis], forces[:, axis, :, 3 + axis] = 1.0 / length, shares
         gradient = np.einsum("nab,nbkj->njak", inverse, np.concatenate([forces, moments], axis=1))
         along = np.concatenate([unit, levers[:, None] * unit], axis=-1) / length[..., None]
-        bound = _spectral(inverse[..., 3:]) * _norm(shares)
+        bound = _norm(inverse[..., 3:].reshape(len(m0), -1)) * _norm(shares)
         return m0, gradient, gradient @ m0[:, None], np.einsum("nkj,nki->njki", along, m0), bound
 
 
@@ -285,10 +285,13 @@ def _bulged(derivatives: Floats, bulges: Floats) -> Floats:
 
 
 def _spectral(maps: Floats) -> Floats:
-    """Return upper bounds (N,) of the spectral norms of maps (N, n, m): by the trace of a power, to 0.1 %."""
+    """Return the spectral norms (N,) of maps (N, n, 3): the largest eigenvalue of a matrix (3, 3) in closed form."""
     gram = np.swapaxes(maps, 1, 2) @ maps
-    scale = np.maximum(np.einsum("nii->n", gram), 1e-300)
-    gram = gram / scale[:, None, None]
-    for _ in range(3):
-        gram = gram @ gram
-    return np.sqrt(scale * np.power(np.einsum("nii->n", gram), 0.125))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = np.moveaxis(gram, 0, -1)
+    mean = (xx + yy + zz) / 3.0
+    a, b, c = xx - mean, yy - mean, zz - mean
+    mixed = xy * xy + xz * xz + yz * yz
+    size = np.sqrt((a * a + b * b + c * c + 2.0 * mixed) / 6.0)
+    determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz)
+    turn = np.arccos(np.clip(0.5 * determinant / np.maximum(size, 1e-100) ** 3, -1.0, 1.0))
+    return np.sqrt(mean + 2.0 * size * np.cos(turn / 3.0))

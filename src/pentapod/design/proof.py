@@ -13,7 +13,7 @@ from pentapod.design.bounds import Boxes
 from pentapod.design.figures import in_poses
 from pentapod.design.geometry import Geometry, rim
 
-ROUNDING = 1e-9
+ROUNDING = 1e-7
 """Share of a value by which a bound is made worse: far more than rounding can make of these few operations."""
 
 Bound = Callable[[Boxes], Floats]
@@ -38,7 +38,7 @@ class ProofOptions:
     around: int = 24
     levels: int = 3
     azimuths: int = 36
-    most: int = 1_000_000
+    most: int = 400_000
     block: int = 4096
 
 
