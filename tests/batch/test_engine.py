@@ -79,6 +79,9 @@ def test_engine_asks_for_what_is_missing(tmp_path, monkeypatch):
     (tmp_path / "b" / made[0].name).mkdir(parents=True)
     with Engine(tmp_path / "b") as engine, pytest.raises(InputError, match=r"expected row\.json; remove it"):
         list(engine.run(made))
+    wrong = pytest.raises(InputError, match=r"not the address of a scheduler \(got 'nonsense'\)")
+    with Engine(tmp_path / "c", scheduler="nonsense") as engine, wrong:
+        list(engine.run(made))
     monkeypatch.setitem(sys.modules, "distributed", None)
     with Engine(tmp_path / "c") as engine, pytest.raises(InputError, match=r'pip install "pentapod\[batch\]"'):
         list(engine.run(made))

@@ -77,6 +77,7 @@ def test_an_interrupted_sweep_keeps_what_is_done_and_goes_on(make_job, tmp_path)
     (tmp_path / "sweep.toml").write_text(f'job = "job.toml"\n[sweep]\n{lengths}\n', encoding="utf-8")
     command = [sys.executable, "-c", MAIN, "sweep", "sweep.toml", "-o", "runs", "-j", "2"]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True) as going:
+        assert going.stderr.readline() == "6 jobs in runs; Ctrl-C keeps what is done\n"
         first = going.stderr.readline()
         os.killpg(going.pid, signal.SIGINT)  # as a terminal does: all processes get it
         rest = going.stderr.read()

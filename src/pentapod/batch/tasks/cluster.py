@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -15,8 +16,9 @@ _SETTINGS = {
     "distributed.scheduler.worker-saturation": 1.0,
     # The engine runs a task again, and counts; the scheduler shall not.
     "distributed.scheduler.allowed-failures": 0,
-    "distributed.worker.daemon": True,
 }
+_ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://[^\s/]+:\d+")
+
 CONNECT_S = 15.0
 """Seconds in which a scheduler must answer."""
 
@@ -34,13 +36,13 @@ def client_of(scheduler: str | None, workers: int | None) -> Generator[Any]:
     import dask.config  # noqa: PLC0415
 
     if scheduler is not None:
+        place: dict[str, str] = {"key": "scheduler", "value": scheduler, "remedy": '"dask scheduler" starts one'}
+        if not _ADDRESS.fullmatch(scheduler):
+            raise InputError("not the address of a scheduler", expected="tcp://host:8786, for example", **place)
         try:
             client = distributed.Client(scheduler, timeout=CONNECT_S, set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise InputError(
-                "no scheduler answers", key="scheduler", value=scheduler, expected='an address, "tcp://host:8786"',
-                remedy='"dask scheduler" starts one',
-            ) from error  # fmt: skip
+        except OSError as error:
+            raise InputError("no scheduler answers", **place) from error
         with client:
             yield client
         return

@@ -100,10 +100,11 @@ class Engine:
         self._sent: dict[tuple[str, str], float] = {}
 
     def __enter__(self) -> Self:
-        self._open.enter_context(locked(self.folder, make=True))
-        remove_unfinished(self.folder)
+        alone = self._open.enter_context(locked(self.folder, make=True))
+        if alone:
+            remove_unfinished(self.folder)
         (self.folder / self._mark).mkdir()
-        self._open.callback(remove_unfinished, self.folder)
+        self._open.callback(self._tidy)
         return self
 
     def __exit__(self, *failure: object) -> None:
@@ -133,6 +134,11 @@ class Engine:
                 count = None if self._scheduler else min(self._workers or cores(), len(missing))
                 self._client = self._open.enter_context(client_of(self._scheduler, count))
             yield from _Rounds(self, missing).done()
+
+    def _tidy(self) -> None:
+        """Remove what is not whole of this engine."""
+        for path in self.folder.glob(f".unfinished-{os.getpid()}-*"):
+            shutil.rmtree(path, ignore_errors=True)
 
     def order(self, task: Task) -> Order:
         """Return a task as workers take it."""

@@ -86,6 +86,8 @@ def _run(
     options = EngineOptions(memory=1e6 * memory, most=most)
     running = run(jobs, out, workers=workers, scheduler=scheduler, parquet=parquet, options=options)
     pace, counts = Pace(len(running)), Counter[str]()
+    if not (quiet or as_json):
+        click.echo(f"{_jobs(len(running))} in {out}; Ctrl-C keeps what is done", err=True)
     try:
         for done in running:
             pace.count(new=done.new)
@@ -98,6 +100,10 @@ def _run(
     finally:
         running.close()
     return _shown(counts, out, as_json=as_json, quiet=quiet)
+
+
+def _jobs(count: int) -> str:
+    return f"{count} job{'' if count == 1 else 's'}"
 
 
 def _line(done: Done, pace: Pace) -> str:
