@@ -33,6 +33,9 @@ def test_task_names_follow_from_function_arguments_files_and_inputs_alone(tmp_pa
     (tmp_path / "a.bin").write_bytes(b"changed later")
     assert (tmp_path / "runs" / "inputs" / a.name).read_bytes() == b"one"
     assert store.keep(tmp_path / "a.bin") != a
+    (store.folder / ".0123456789ab").write_bytes(b"cut off by a kill")
+    with Engine(tmp_path / "runs"):
+        assert sorted(path.stem[0] for path in store.folder.iterdir()) == ["a", "a", "b"]
 
     def name(**other):
         given = {"arguments": {"x": 1}, "files": {"job.toml": "a"}, "inputs": (a,), **other}
@@ -46,7 +49,7 @@ def test_task_names_follow_from_function_arguments_files_and_inputs_alone(tmp_pa
 
 
 def test_engine_does_each_task_once_and_tells_what_crashed(tmp_path):
-    how = {2: "segfault", 3: "large", 4: "error"}
+    how = {1: "no number", 2: "segfault", 3: "large", 4: "error"}
     log, out, options = tmp_path / "log", tmp_path / "runs", EngineOptions(memory=4e8, tries=1, alone=1)
     made = stub_tasks.tasks(6, log, how=how)
     with Engine(out, workers=1, options=options) as engine:
@@ -54,7 +57,8 @@ def test_engine_does_each_task_once_and_tells_what_crashed(tmp_path):
         with pytest.raises(InputError, match="another run is writing into this folder"), Engine(out):
             pass
     rows = in_order(made, found)
-    assert [row["status"] for row in rows] == ["passed", "passed", "crashed", "crashed", "crashed", "passed"]
+    assert [row["status"] for row in rows] == ["passed", *["crashed"] * 4, "passed"]
+    assert rows[1]["cause"].startswith("ValueError: Out of range float values")
     assert "SIGSEGV" in rows[2]["cause"]
     assert rows[3]["cause"] == "out of memory: more than 400 MB"
     assert rows[4]["cause"] == "KeyError: 4"

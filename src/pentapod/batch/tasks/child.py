@@ -21,14 +21,17 @@ from pentapod.batch.tasks.task import function_of
 OUT_OF_MEMORY = "out of memory"
 
 
-def answer(order: dict[str, Any]) -> dict[str, Any]:
-    """Run a task in this process: its row, or what it crashed with, and where. order: function, folder, arguments."""
+def answer(order: dict[str, Any]) -> str:
+    """Run a task in this process; return its row, or what it crashed with, and where, in JSON.
+
+    order: function, folder, arguments.
+    """
     try:
-        return {"row": function_of(order["function"])(Path(order["folder"]), **order["arguments"])}
-    except MemoryError:
-        return {"crashed": OUT_OF_MEMORY, "trace": traceback.format_exc()}
+        row = function_of(order["function"])(Path(order["folder"]), **order["arguments"])
+        return json.dumps({"row": row}, allow_nan=False)
     except (Exception, SystemExit) as error:
-        return {"crashed": f"{type(error).__name__}: {error}", "trace": traceback.format_exc()}
+        crashed = OUT_OF_MEMORY if isinstance(error, MemoryError) else f"{type(error).__name__}: {error}"
+        return json.dumps({"crashed": crashed, "trace": traceback.format_exc()})
 
 
 def _listen(orders: SimpleQueue[dict[str, Any]]) -> None:
@@ -46,7 +49,7 @@ def main() -> None:
     orders: SimpleQueue[dict[str, Any]] = SimpleQueue()
     threading.Thread(target=_listen, args=(orders,), daemon=True).start()
     while True:
-        answers.write(json.dumps(answer(orders.get()), allow_nan=False).encode() + b"\n")
+        answers.write(answer(orders.get()).encode() + b"\n")
         answers.flush()
 
 

@@ -103,6 +103,7 @@ class Engine:
         alone = self._open.enter_context(locked(self.folder, make=True))
         if alone:
             remove_unfinished(self.folder)
+            self.store.tidy()
         (self.folder / self._mark).mkdir()
         self._open.callback(self._tidy)
         return self

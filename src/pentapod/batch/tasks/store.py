@@ -63,6 +63,11 @@ class Store:
         """Keep a content, unless it is there, and return it. Raises InputError: it cannot be written."""
         return self._kept(stem, suffix, io.BytesIO(data))
 
+    def tidy(self) -> None:
+        """Remove copies that were cut off; nobody else may be writing."""
+        for path in self.folder.glob(".*"):
+            path.unlink(missing_ok=True)
+
     def _kept(self, stem: str, suffix: str, source: IO[bytes]) -> Input:
         digest, copied = hashlib.sha256(), self.folder / f".{secrets.token_hex(6)}"
         try:

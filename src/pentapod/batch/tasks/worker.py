@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import secrets
 import shutil
 import time
@@ -10,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pentapod.base.files import atomic_write, sha256_of
+from pentapod.base.files import atomic_write
 from pentapod.batch.tasks.folder import finish, finished_row, packed, write_files
 from pentapod.batch.tasks.process import Child
 from pentapod.batch.tasks.store import INPUTS, Input
@@ -102,11 +103,13 @@ def performed(order: Order, base: Path, address: str, ending: Callable[[], bool]
 
 def receive(name: str, sha256: str, data: bytes, dask_worker: Any = None) -> bool:
     """Keep an input on this worker's file system; return whether it arrived whole."""
+    if hashlib.sha256(data).hexdigest() != sha256:
+        return False
     folder = Path(dask_worker.local_directory) / "pentapod" / INPUTS
     folder.mkdir(parents=True, exist_ok=True)
     with atomic_write(folder / name) as temporary:
         temporary.write_bytes(data)
-    return sha256_of(folder / name) == sha256
+    return True
 
 
 def _difference(theirs: Mapping[str, str]) -> str:
