@@ -6,7 +6,7 @@ import time
 import pytest
 
 from pentapod.numerics.kernels import kernels_pay, kernels_used
-from pentapod.numerics.threads import cores, in_threads
+from pentapod.numerics.threads import CORES, cores, in_threads
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5, None])
@@ -41,3 +41,12 @@ def test_what_is_set_for_a_block_holds_in_its_threads():
     with kernels_used("never"):
         assert list(in_threads(lambda _: kernels_pay(1e9), range(4), 2)) == [False] * 4
     assert cores() >= 1
+
+
+def test_the_environment_says_how_many_cores_a_process_uses(monkeypatch):
+    monkeypatch.setenv(CORES, "3")
+    assert cores() == 3
+    monkeypatch.setenv(CORES, "some")
+    given = cores()
+    monkeypatch.delenv(CORES)
+    assert given == cores() >= 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import secrets
 import shutil
@@ -24,6 +25,8 @@ from pentapod.batch.tasks.task import Row, Task, versions
 from pentapod.batch.tasks.worker import Answer, Order, execute, receive
 from pentapod.job.run_folder import locked, remove_unfinished
 from pentapod.numerics.threads import cores
+
+_log = logging.getLogger("pentapod")
 
 LOG = "log.jsonl"
 """What happened when, and where: a line for each answer of a worker. No table depends on it."""
@@ -95,6 +98,7 @@ class Engine:
         self._workers, self._scheduler = workers, scheduler
         self._open = ExitStack()
         self._client: Any = None
+        self._has_waited = False
         self._mark = f".unfinished-{os.getpid()}-{secrets.token_hex(4)}"
         self._numbers = Counter[str]()
         self._sent: dict[tuple[str, str], float] = {}
@@ -165,12 +169,15 @@ class Engine:
             self._client.run(receive, each.name, each.sha256, data, workers=[answer.worker], on_error="ignore")
 
     def check(self) -> None:
-        """Raise InputError where the scheduler is gone."""
+        """Raise InputError where the scheduler is gone; say once where it has no workers."""
         if lost_scheduler(self._client):
             raise InputError(
                 "the connection to the scheduler was lost", value=self._scheduler,
                 remedy="what is done is kept: the same command goes on from there",
             )  # fmt: skip
+        if self._scheduler is not None and not self._has_waited and not self._client.scheduler_info()["workers"]:
+            self._has_waited = True
+            _log.warning('the scheduler has no workers yet; "dask worker %s --nthreads 1" starts one', self._scheduler)
 
     def cancel(self, futures: list[Any]) -> None:
         """Drop tasks that are not done."""
