@@ -36,7 +36,7 @@ def client_of(scheduler: str | None, workers: int | None) -> Generator[Any]:
     import dask.config  # noqa: PLC0415
 
     if scheduler is not None:
-        place: dict[str, str] = {"key": "scheduler", "value": scheduler, "remedy": '"dask scheduler" starts one'}
+        place: dict[str, Any] = {"key": "scheduler", "value": scheduler, "remedy": '"dask scheduler" starts one'}
         if not _ADDRESS.fullmatch(scheduler):
             raise InputError("not the address of a scheduler", expected="tcp://host:8786, for example", **place)
         try:
