@@ -19,7 +19,7 @@ sys.path[:0] = [str(TESTS), str(TESTS / "batch")]
 
 import killed_batch  # noqa: E402
 import stub_tasks  # noqa: E402
-from test_engine import elsewhere  # noqa: E402
+from test_task_engine import elsewhere  # noqa: E402
 
 from pentapod.batch import Engine, Store, Task  # noqa: E402
 from pentapod.batch.jobs import RESULTS, job_task  # noqa: E402

@@ -11,7 +11,7 @@ from pathlib import Path
 import killed_batch
 import pytest
 import stub_tasks
-from test_engine import table
+from test_task_engine import table
 
 from pentapod.batch import Store, batch
 from pentapod.batch.jobs import RESULTS, job_task, plan_in
