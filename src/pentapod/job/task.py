@@ -17,6 +17,7 @@ from pentapod.job.stage_runner import INTERRUPTED, StageRunner
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
 from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
+from pentapod.planning.leg_path.tolerances import tolerances_beside
 from pentapod.planning.placement.common_axes import FIXED
 from pentapod.planning.plan import PlacementOptions, fits
 from pentapod.planning.problem.constraints import FREE
@@ -176,13 +177,11 @@ class Task:
         }
 
     def _path(self, placed: PlacedPath) -> LegPath | Refusal:
-        return leg_path(
-            placed,
-            self.machine,
-            path_tolerance=self.closer * self.specification.path_tolerance,
-            axis_tolerance=self.closer * self.specification.axis_tolerance,
-            stop_angle=self.job.feed.si.stop_angle,
-        )
+        asked = self.specification
+        tolerances = (self.closer * asked.path_tolerance, self.closer * asked.axis_tolerance)
+        path, axis = tolerances_beside(placed, asked.collision_world or NOTHING, *tolerances)
+        stop_angle = self.job.feed.si.stop_angle
+        return leg_path(placed, self.machine, path_tolerance=path, axis_tolerance=axis, stop_angle=stop_angle)
 
     def _program(self, placed: PlacedPath, trajectory: Trajectory, file: Path) -> Program:
         made_on = (processor_kind(), library_versions())

@@ -10,8 +10,13 @@ from pentapod.base.errors import ToolpathError
 from pentapod.base.refusal import Refusal
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.geometry.solids import Solid
 from pentapod.kinematics.component import Component
+from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning.leg_path.leg_path import LegPath, leg_path
+from pentapod.planning.leg_path.tolerances import tolerances_beside
 from pentapod.planning.placement.placed_path import PlacedPath, Placement
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
@@ -278,3 +283,66 @@ def test_stops_at_corners_as_sharp_as_asked(desk, mixed):
     assert isinstance(path, LegPath)
     assert len(path.pieces) == len(free.pieces) + 4  # two corners of the cut, and where links lead into it and out
     assert not path.dwells.any()
+
+
+def tip_deviations(path, points):
+    """Largest deviation of a path from a polyline (N, 3) in the machine, within a millimetre of each of its points."""
+    tips = path.pose(np.linspace(0.0, path.length, 20001))[0]
+    step = np.diff(points, axis=0)
+    share = np.einsum("kj,nkj->nk", step, tips[:, None] - points[:-1]) / np.einsum("kj,kj->k", step, step)
+    off = np.linalg.norm(tips[:, None] - points[:-1] - np.clip(share, 0.0, 1.0)[..., None] * step, axis=2).min(axis=1)
+    return np.array([off[np.linalg.norm(tips - point, axis=1) < 1e-3].max() for point in points])
+
+
+def zigzag(desk):
+    """Five teeth of 5 mm, and the axis upright."""
+    tips = np.c_[5e-3 * np.arange(11), 5e-3 * (np.arange(11) % 2), np.zeros(11)]
+    up = np.tile([0.0, 0.0, 1.0], (11, 1))
+    return placed_on(desk, Toolpath((Segment(SegmentKind.CUT, tips, up, 0.02),), 0.003))
+
+
+def test_tolerances_at_the_waypoints_hold_around_them(desk):
+    placed = zigzag(desk)
+    everywhere = np.full(11, TOLERANCE)
+    tight = np.where(np.arange(11) == 5, 0.1, 1.0) * everywhere
+    one, same, other = (
+        leg_path(placed, desk, path_tolerance=each, axis_tolerance=AXIS_TOLERANCE)
+        for each in (TOLERANCE, everywhere, tight)
+    )
+    np.testing.assert_array_equal(one(np.linspace(0.0, one.length, 999)), same(np.linspace(0.0, one.length, 999)))
+    before, after = tip_deviations(one, placed.tips), tip_deviations(other, placed.tips)
+    assert before[1:-1].min() > 0.2 * TOLERANCE
+    assert after[5] <= 0.1 * TOLERANCE
+    assert after[[1, 2, 8, 9]].min() > 0.2 * TOLERANCE
+
+
+def beside_a_wall(desk, gap, wide=True):
+    """The zigzag, a shank of 4 mm whose side is `gap` from a wall that the teeth point to, and the tolerances there."""
+    placed = zigzag(desk)
+    y = 5e-3 + 2e-3 + gap
+    corners = np.array([[-0.1, y, -0.01], [0.1, y, -0.01], [0.0, y, 0.02 if wide else -0.009]])
+    wall = Obstacle("part", MeshDistance.of(Mesh.of(corners, np.array([[0, 1, 2]]))), clamped=True, allowance=50e-6)
+    world = CollisionWorld((wall,), (Solid("shank", 0.006, 0.03, 2e-3, 2e-3),))
+    return tolerances_beside(placed, world, TOLERANCE, AXIS_TOLERANCE)
+
+
+@pytest.mark.parametrize("gap", [-35e-6, 0.0, 1e-2])
+def test_a_motion_within_its_tolerances_keeps_the_shank_clear_of_a_wall(desk, gap):
+    path, axis = beside_a_wall(desk, gap)
+    near, far = np.arange(1, 10, 2), np.arange(0, 11, 2)
+    rise = 0.02 - 0.003  # of the wall above the ball's centre
+    room = gap + 50e-6
+    assert (path[near] + rise * np.sin(axis[near]) < room).all()
+    np.testing.assert_array_equal(path[far], TOLERANCE)
+    np.testing.assert_array_equal(axis[far], AXIS_TOLERANCE)
+    if gap > 1e-3:
+        np.testing.assert_array_equal(path, TOLERANCE)
+        np.testing.assert_array_equal(axis, AXIS_TOLERANCE)
+    else:
+        assert axis[near].max() < AXIS_TOLERANCE
+    assert path.min() >= 0.05 * TOLERANCE
+
+
+def test_an_axis_may_turn_where_the_obstacle_does_not_reach_up_to_the_shank(desk):
+    _, axis = beside_a_wall(desk, -35e-6, wide=False)
+    np.testing.assert_array_equal(axis, AXIS_TOLERANCE)

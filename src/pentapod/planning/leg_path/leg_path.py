@@ -8,12 +8,13 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import BSpline
 
 from pentapod.base.arrays import Bools, Floats, Ints, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.refusal import Refusal, Shortfall, stage
 from pentapod.base.values import Result, Value
-from pentapod.geometry.fillet import TooFar, blended
+from pentapod.geometry.fillet import blended
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.machine import Machine
 from pentapod.planning.leg_path.tool_curve import ToolCurve
@@ -148,21 +149,22 @@ def leg_path(
     placed: PlacedPath,
     machine: Machine,
     *,
-    path_tolerance: float,
-    axis_tolerance: float,
+    path_tolerance: ArrayLike,
+    axis_tolerance: ArrayLike,
     stop_angle: float = STOP_ANGLE,
 ) -> LegPath | Refusal:
     """Return the smooth leg path through the placed tool poses.
 
     path_tolerance: largest deviation of the tilt centre (the cutter's ball centre, the beam's spot) from the toolpath,
-    metres; axis_tolerance: of the axis from the planned one, radians. Corners are blended within both. The machine
+    metres; axis_tolerance: of the axis from the planned one, radians; both one for all or one for each waypoint (N,),
+    linear between them (`tolerances_beside`). Corners are blended within both. The machine
     stops where a rapid meets another kind of motion, where the toolpath has a stop, and at corners that turn by more
     than `stop_angle` radians. Raises ToolpathError for numbers that are not positive. Returns a Refusal for a path
     without motion.
     """
     given = {"path_tolerance": path_tolerance, "axis_tolerance": axis_tolerance, "stop_angle": stop_angle}
     for name, value in given.items():
-        if not value > 0.0:
+        if not (np.asarray(value) > 0.0).all():
             raise ToolpathError("must be positive", key=name, value=value)
     toolpath = placed.toolpath
     points = np.hstack([placed.tilt_centres, placed.axes])
@@ -175,6 +177,8 @@ def leg_path(
     if keep.sum() < 2:
         everywhere = Shortfall("motion", ((0, len(toolpath) - 1),), 0.0, "mm")
         return Refusal("leg path", "the toolpath does not move", (everywhere,))
+    tolerances = [np.broadcast_to(each, len(points))[keep] for each in (path_tolerance, axis_tolerance)]
+    allowed = TOLERANCE_SHARE * np.stack(tolerances, axis=1)
     points, u = points[keep], np.concatenate([[0.0], np.cumsum(steps[moving])])
     segment = toolpath.segment_of_interval[moving]
     stops = np.zeros(len(points), dtype=np.bool_)
@@ -186,11 +190,10 @@ def leg_path(
             stops[stood], dwells[stood] = True, dwells[stood] + seconds
     stops[[0, -1]] = True
     bounds = np.flatnonzero(stops)
-    too_far = _tolerance(TOLERANCE_SHARE * path_tolerance, TOLERANCE_SHARE * axis_tolerance)
     pieces = []
     for a, b in pairwise(bounds.tolist()):
-        spline = blended(u[a : b + 1] - u[a], points[a : b + 1], too_far)
-        curve = ToolCurve.of(spline, toolpath.tilt_centre)
+        both = blended(u[a : b + 1] - u[a], np.hstack([points[a : b + 1], allowed[a : b + 1]]), _too_far)
+        curve = ToolCurve.of(BSpline(both.t, both.c[:, :6].copy(), both.k), toolpath.tilt_centre)
         ends = np.flatnonzero(np.diff(segment[a:b], append=-1)) + 1
         which = segment[a:b][ends - 1]
         pieces.append(
@@ -210,19 +213,16 @@ def leg_path(
     return LegPath(tuple(pieces), starts, dwells[bounds])
 
 
-def _tolerance(path: float, axis: float) -> TooFar:
-    """Return the test whether a blended path may deviate by more than `path` metres or `axis` radians.
+def _too_far(differences: Floats, chords: Floats) -> Bools:
+    """Return on which spans the blended path may deviate by more than is allowed: points (N, 8) end with both numbers.
 
-    Both are bounded by the Bernstein coefficients of curve minus polyline, which enclose it. A vector within ε of one
-    of length n is at most asin(ε / n) from its direction.
+    The Bernstein coefficients of curve minus polyline enclose the deviation. A vector within ε of one of length n is at
+    most asin(ε / n) from its direction.
     """
-
-    def too_far(differences: Floats, chords: Floats) -> Bools:
-        off, turned = (np.linalg.norm(differences[:, part], axis=1).max(axis=1) for part in (slice(3), slice(3, 6)))
-        nearest = _distance_to_origin(chords[:, 3:, 0], chords[:, 3:, 1])
-        return np.asarray((off > path) | (turned > np.sin(axis) * nearest))
-
-    return too_far
+    off, turned = (np.linalg.norm(differences[:, part], axis=1).max(axis=1) for part in (slice(3), slice(3, 6)))
+    nearest = _distance_to_origin(chords[:, 3:6, 0], chords[:, 3:6, 1])
+    path, axis = chords[:, 6:].min(axis=2).T
+    return np.asarray((off > path) | (turned > np.sin(axis) * nearest))
 
 
 def _distance_to_origin(a: Floats, b: Floats) -> Floats:
