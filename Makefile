@@ -17,7 +17,8 @@ LOWEST_TESTS := tests/numerics tests/geometry tests/kinematics tests/timing test
 
 .PHONY: demo test test-all test-lowest lock lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view bench-machines bench-batch bench-design kernels reference pictures site clean
 
-demo: $(READY)  ## plan a dome and judge the program
+demo: $(READY)  ## plan a dome and judge the program; kernels are compiled before, on all cores
+	$(BIN)/pentapod warm-up
 	$(BIN)/pentapod plan toolpaths/dome.toml -o out/
 
 test: $(READY)  ## the fast suite; kernels are compiled before, on all cores

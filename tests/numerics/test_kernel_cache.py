@@ -6,10 +6,12 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
 from pentapod.numerics import kernel_cache, kernels
+from pentapod.numerics.kernels import kernel
 
 RUN = """
 import logging
@@ -146,3 +148,23 @@ def test_folders_of_other_versions_go_after_a_month_without_use(package: Package
     assert not {"pentapod-kernels-old"} & left
     assert {"pentapod-kernels-young", "somebody-else"} < left
     assert len(left) == 3
+
+
+@kernel
+def _plus(x: int, y: int) -> int:
+    return x + y
+
+
+@kernel
+def _sum_with_a_constant(x: int) -> int:
+    return _plus(x, 1) + _plus(x, x)
+
+
+@kernel
+def sum_with_a_constant(x: int) -> int:
+    return _sum_with_a_constant(x)
+
+
+def test_a_kernel_is_compiled_once_for_constants_and_variables():
+    assert sum_with_a_constant(3) == 10
+    assert len(cast("Any", _plus).overloads) == 1

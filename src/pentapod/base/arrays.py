@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import reduce
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,8 @@ from pentapod.base.errors import ArrayError
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.intp]
 Bools: TypeAlias = NDArray[np.bool_]
+
+_Number = TypeVar("_Number", bound=np.generic)
 
 
 def as_floats(value: ArrayLike, name: str, shape: tuple[int | None, ...] | None = None) -> Floats:
@@ -49,6 +51,16 @@ def frozen(value: ArrayLike, name: str, shape: tuple[int | None, ...] | None = N
     array = as_floats(value, name, shape).copy()
     array.flags.writeable = False
     return array
+
+
+def read_only(array: NDArray[_Number]) -> NDArray[_Number]:
+    """Return a read-only view of an array, of a copy where it is not contiguous.
+
+    What callers may give in any layout, writable or not, goes to kernels like this: they are compiled only once.
+    """
+    view = np.ascontiguousarray(array).view()
+    view.flags.writeable = False
+    return view
 
 
 def set_frozen(instance: object, **values: Any) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.base.arrays import Floats, as_floats, frozen
+from pentapod.base.arrays import Floats, as_floats, frozen, read_only
 from pentapod.base.errors import ArrayError, MachineError
 from pentapod.kinematics.arithmetic import Arithmetic, Joints, Vector, dot
 from pentapod.kinematics.batches import as_poses, joined_poses
@@ -93,7 +93,7 @@ class FiveLegs(LegsOnLine):
         if kernels_pay(SAVED_BY_KERNELS * len(p)):
             from pentapod.kinematics.five_legs_kernels import lengths  # noqa: PLC0415
 
-            lengths(p, i, self.base, self.offsets, legs)
+            lengths(read_only(p), read_only(i), self.base, self.offsets, legs)
             return legs.reshape(*batch, 5)
         x, y, z = self.base[:, :1], self.base[:, 1:], self.offsets[:, None]
         for block in blocks(len(p)):

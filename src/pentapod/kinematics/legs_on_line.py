@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Floats, read_only
 from pentapod.kinematics.batches import as_poses, common_batch
 
 
@@ -45,5 +45,7 @@ class LegsOnLine:
         robot, curve = cast("Any", self), np.array(tips)
         legs = np.empty((len(tips), curve.shape[2], self.n_legs))
         levers = tool_length - robot.offsets
-        readings_along(curve[:, 0], curve[:, 1], robot.base_joints, levers, robot.radii, robot.zeros, legs)
+        along = read_only(curve[:, 0]), read_only(curve[:, 1])
+        fixed = read_only(robot.base_joints), read_only(levers), read_only(robot.radii), read_only(robot.zeros)
+        readings_along(*along, *fixed, legs)
         return list(legs)

@@ -83,8 +83,8 @@ class PointByPoint:
         self._found = np.zeros(int(function.numel_out(last)))
         self._buffer, self._evaluate = function.buffer()
         for k, numbers in enumerate(self._given):
-            self._buffer.set_arg(k, memoryview(numbers))
-        self._buffer.set_res(last, memoryview(self._found))
+            self._buffer.set_arg(k, numbers.data)
+        self._buffer.set_res(last, self._found.data)
 
     def __call__(self, *inputs: Floats) -> Floats:
         """Return the output at all points."""

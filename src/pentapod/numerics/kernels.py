@@ -54,11 +54,17 @@ def kernels_used(policy: _Policy) -> Generator[None]:
 
 
 def kernel(function: _Function) -> _Function:
-    """Compile a function on its first call; division by zero gives infinity, as in NumPy, and sums keep their order."""
-    from numba import config, njit  # noqa: PLC0415  heavy: only where kernels are used
+    """Compile a function on its first call; division by zero gives infinity, as in NumPy, and sums keep their order.
 
+    It is compiled once for all values of its numbers, constants too, and without entries that nothing uses: a name with
+    an underscore is called by kernels only.
+    """
+    from numba import config, njit, types  # noqa: PLC0415  heavy: only where kernels are used
+
+    unliteral: Any = types.unliteral
     settings: Any = config  # made from the environment as it is loaded
-    options: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "nogil": True}
+    options: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "nogil": True, "no_cfunc_wrapper": True}
+    options["no_cpython_wrapper"] = function.__name__.startswith("_")
     with _choosing:
         given: str = settings.CACHE_DIR
         folder = kernel_cache(given)
@@ -79,7 +85,7 @@ def kernel(function: _Function) -> _Function:
     def compile_once(signature: Any) -> Any:
         """Compile under the kernel's lock: from the look into the cache to the entry in it."""
         with lock:
-            return compile_alone(signature)
+            return compile_alone(tuple(unliteral(kind) for kind in signature))
 
     dispatcher.compile = compile_once
     return cast("_Function", dispatcher)

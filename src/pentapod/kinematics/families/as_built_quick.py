@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.base.arrays import Bools, Floats, as_batch
+from pentapod.base.arrays import Bools, Floats, as_batch, read_only
 from pentapod.base.errors import ArrayError
 from pentapod.kinematics.batches import broadcast
 from pentapod.kinematics.families.as_built_forward import Nominal
@@ -39,7 +39,8 @@ def quick_poses(
     order = np.zeros(len(signs)) if isinstance(nominal, LinearPentapod) else np.ascontiguousarray(signs[:, 0])
     proven = np.zeros(len(poses), dtype=np.bool_)
     stages = _stages(machine, nominal, lengths)
-    built_poses(lengths, poses, *stages, signs, order, length_scale(machine), proven)
+    fixed = read_only(signs), read_only(order)
+    built_poses(np.ascontiguousarray(lengths), poses, *stages, *fixed, length_scale(machine), proven)
     return poses[:, :3].reshape(*batch, 3), poses[:, 3:].reshape(*batch, 3), proven.reshape(batch)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pentapod.base.arrays import Floats, Ints, as_batch, frozen, set_frozen
+from pentapod.base.arrays import Floats, Ints, as_batch, frozen, read_only, set_frozen
 from pentapod.base.errors import MachineError
 from pentapod.base.values import Value
 from pentapod.kinematics.arithmetic import Arithmetic, Vector
@@ -199,7 +199,7 @@ class LinearPentapod(Value, FiveLegs, ProvenByLegEquations):
 
                 limits = np.array([NEAR_W_SQUARED, linear.near_s_squared])
                 geometry = (linear.linear_map, linear.constant, self.delta, self._origin, limits)
-                poses(legs, signs, *geometry, position, direction, near)
+                poses(read_only(legs), read_only(signs), *geometry, position, direction, near)
             else:
                 for block in blocks(len(legs)):
                     columns = legs[block].T.copy()

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints, read_only
 from pentapod.mesh.geodesic.places import PatchOn
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.slicing import LevelSet
@@ -156,7 +156,7 @@ def _layout(patch: Patch, lengths: Floats, options: GeodesicOptions) -> Layout:
     """Return a patch's facets laid flat, with edges of the given lengths (E,)."""
     from pentapod.mesh.geodesic.front_kernels import Layout  # noqa: PLC0415  numba is heavy
 
-    topology, faces = patch.topology, np.ascontiguousarray(patch.faces, dtype=np.intp)
+    topology, faces = patch.topology, read_only(patch.faces.astype(np.intp, copy=False))
     edges = np.ascontiguousarray(topology.edge_of_side, dtype=np.intp)
     side = lengths[edges]
     after, before = np.roll(side, -1, axis=1), np.roll(side, 1, axis=1)

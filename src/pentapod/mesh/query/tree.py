@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints, read_only
 from pentapod.mesh.mesh import Mesh
 
 FACETS_PER_LEAF = 4
@@ -71,9 +71,8 @@ class FacetTree:
 
         distances, away = np.empty(len(points)), np.empty((len(points), 3))
         facets = np.empty(len(points), dtype=np.intp)
-        closest_of_all(
-            np.ascontiguousarray(points), within, self.corners, self.starts, self.extents, distances, away, facets
-        )
+        given = (read_only(points), within, self.corners, self.starts, self.extents)
+        closest_of_all(*given, distances, away, facets)
         return distances, away, facets
 
     def within(self, points: Floats, distance: float) -> Bools:
