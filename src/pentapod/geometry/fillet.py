@@ -27,6 +27,12 @@ DEGREE = 4
 HALVINGS = 40
 """Rounds of halving after which the spacing of numbers is reached."""
 
+BULGE = 7.0 / 24.0
+"""Distance of the curve from a corner, over the knots' distance and the change of direction."""
+
+APART = 0.9
+"""Share of the way to where two corners' knots would meet that they may use."""
+
 PARTS = 8
 """Parts of a span that are tested where its own coefficients are not within the tolerance."""
 
@@ -37,14 +43,16 @@ differences: Bernstein coefficients of curve minus polyline; chords: the polylin
 """
 
 
-def blended(parameter: Floats, points: Floats, too_far: TooFar) -> BSpline:
+def blended(parameter: Floats, points: Floats, too_far: TooFar, between: Floats | None = None) -> BSpline:
     """Return a clamped C3 spline of degree 4 near the polyline of points (N, D) at parameters (N,), with exact ends.
 
+    between: knots to begin with beside the parameters, from `knots_between`.
     Raises ArrayError where the parameters do not increase strictly, and where `HALVINGS` rounds do not suffice.
     """
     if len(parameter) < 2 or not (np.diff(parameter) > 0.0).all():
         raise ArrayError("parameters must increase strictly", key="parameter", expected="two or more")
-    knots, changed = parameter, np.ones(len(parameter) - 1, dtype=np.bool_)
+    knots = parameter if between is None else np.union1d(parameter, between)
+    changed = np.ones(len(knots) - 1, dtype=np.bool_)
     for _ in range(HALVINGS):
         curve = schoenberg(knots, parameter, points)
         rows = np.flatnonzero(changed)
@@ -56,6 +64,27 @@ def blended(parameter: Floats, points: Floats, too_far: TooFar) -> BSpline:
         changed = np.repeat(binary_dilation(far, iterations=DEGREE), 1 + far)
         knots = np.sort(np.concatenate([knots, 0.5 * (knots[:-1] + knots[1:])[far]]))
     raise ArrayError("the tolerance is too small for the spacing of numbers", value=float(np.diff(knots).min()))
+
+
+def knots_between(parameter: Floats, reach: Floats) -> Floats:
+    """Return knots (K,) between parameters (N,) with which the curve cuts each corner about as widely as it may.
+
+    reach (N,): distances of evenly spaced knots with which it does; its distance from the corner is then `BULGE` times
+    that, times the turn. Two knots on either side of a corner determine the curve there. Where neighbours reach too far
+    they share one.
+    """
+    gap, left, right = np.diff(parameter), reach[:-1], reach[1:]
+    asks, asked = left < gap, right < gap
+    own, other = np.where(asks, left, 0.0), np.where(asked, right, 0.0)
+    middle = gap * own / np.maximum(own + other, np.finfo(float).tiny)  # how far knots of the left corner may lie
+    crowded = asks & asked & (left + right > APART * gap)
+    found = [(parameter[:-1] + middle)[crowded]]
+    for step in (1.0, 2.0):
+        fits = asks & ~crowded & (step * left <= APART * middle)
+        found.append((parameter[:-1] + step * left)[fits])
+        fits = asked & ~crowded & (step * right <= APART * (gap - middle))
+        found.append((parameter[1:] - step * right)[fits])
+    return np.concatenate(found)
 
 
 def schoenberg(knots: Floats, parameter: Floats, points: Floats) -> BSpline:

@@ -14,7 +14,7 @@ from pentapod.base.arrays import Bools, Floats, Ints, frozen, set_frozen
 from pentapod.base.errors import ToolpathError
 from pentapod.base.refusal import Refusal, Shortfall, stage
 from pentapod.base.values import Result, Value
-from pentapod.geometry.fillet import blended
+from pentapod.geometry.fillet import BULGE, blended, knots_between
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.machine import Machine
 from pentapod.planning.leg_path.tool_curve import ToolCurve
@@ -27,6 +27,15 @@ STOP_ANGLE = float(np.radians(135.0))
 TOLERANCE_SHARE = 0.8
 """Share of the tolerances for blending corners; the rest is for setpoints and interpolation."""
 
+STRAIGHT_SHARE = 0.02
+"""Share of the tolerances within which the path between two waypoints is straight; those between are left out."""
+
+LINEAR_SHARE = 0.1
+"""Share of a tolerance by which it may differ from what is linear between the waypoints that are not left out."""
+
+NEARLY = 0.97
+"""Share of the tolerances that blends at corners aim at: their bounds are a little above what they bound."""
+
 AXIS_LEVER_M = 0.01
 """Metres of spline parameter per radian, so that the parameter is regular where only the axis turns."""
 
@@ -36,7 +45,7 @@ class LegPiece(Value):
     """A C3 piece of the leg path between two exact stops, parametrised by s in metres (`ToolCurve`).
 
     section_ends (M,): s at which the toolpath's segments end, the last is `length`; section_feeds (M,): m/s, infinite
-    on rapids; section_kinds, section_segments (M,): kind and index of the segment. waypoint_stations (W,): s nearest to
+    on rapids; section_kinds, section_segments (M,): kind and index of the segment. waypoint_stations (W,): s about at
     each waypoint; waypoints (W,): its index in the toolpath.
     """
 
@@ -157,10 +166,10 @@ def leg_path(
 
     path_tolerance: largest deviation of the tilt centre (the cutter's ball centre, the beam's spot) from the toolpath,
     metres; axis_tolerance: of the axis from the planned one, radians; both one for all or one for each waypoint (N,),
-    linear between them (`tolerances_beside`). Corners are blended within both. The machine
-    stops where a rapid meets another kind of motion, where the toolpath has a stop, and at corners that turn by more
-    than `stop_angle` radians. Raises ToolpathError for numbers that are not positive. Returns a Refusal for a path
-    without motion.
+    linear between them (`tolerances_beside`). Corners are blended within both; waypoints on a straight way between
+    others do not shape the path. The machine stops where a rapid meets another kind of motion, where the toolpath has a
+    stop, and at corners that turn by more than `stop_angle` radians. Raises ToolpathError for numbers that are not
+    positive. Returns a Refusal for a path without motion.
     """
     given = {"path_tolerance": path_tolerance, "axis_tolerance": axis_tolerance, "stop_angle": stop_angle}
     for name, value in given.items():
@@ -190,9 +199,12 @@ def leg_path(
             stops[stood], dwells[stood] = True, dwells[stood] + seconds
     stops[[0, -1]] = True
     bounds = np.flatnonzero(stops)
+    shaping = _shaping(u, points, allowed, stops, segment)
     pieces = []
     for a, b in pairwise(bounds.tolist()):
-        both = blended(u[a : b + 1] - u[a], np.hstack([points[a : b + 1], allowed[a : b + 1]]), _too_far)
+        rows = a + np.flatnonzero(shaping[a : b + 1])
+        between = knots_between(u[rows] - u[a], _reach(u[rows], points[rows], allowed[rows]))
+        both = blended(u[rows] - u[a], np.hstack([points[rows], allowed[rows]]), _too_far, between)
         curve = ToolCurve.of(BSpline(both.t, both.c[:, :6].copy(), both.k), toolpath.tilt_centre)
         ends = np.flatnonzero(np.diff(segment[a:b], append=-1)) + 1
         which = segment[a:b][ends - 1]
@@ -211,6 +223,37 @@ def leg_path(
         )
     starts = np.concatenate([[0.0], np.cumsum([piece.length for piece in pieces])])
     return LegPath(tuple(pieces), starts, dwells[bounds])
+
+
+def _shaping(u: Floats, points: Floats, allowed: Floats, stops: Bools, segment: Ints) -> Bools:
+    """Return which points (N,) shape the path: all but those near the chords between these.
+
+    Stops and ends of segments, between intervals (N − 1,), are kept, and points where the tolerances `allowed` (N, 2)
+    are not about linear. The blend around a corner is then as wide as the tolerances allow, however close the waypoints
+    are, and knots follow the path's curvature.
+    """
+    from pentapod.planning.leg_path.sparse_kernels import mark_shaping  # noqa: PLC0415 - loads numba
+
+    keep = stops.copy()
+    keep[1:-1] |= segment[1:] != segment[:-1]
+    near = np.repeat(_vectors(allowed), 3, axis=1) * (STRAIGHT_SHARE / TOLERANCE_SHARE / 3.0**0.5)
+    mark_shaping(u, np.hstack([points, allowed]), np.hstack([near, LINEAR_SHARE * allowed]), keep)
+    return keep
+
+
+def _reach(u: Floats, points: Floats, allowed: Floats) -> Floats:
+    """Return at which distance (N,) knots let the curve leave each point of a polyline (N, 6) by what is allowed."""
+    turn = np.diff(np.diff(points, axis=0) / np.diff(u)[:, None], axis=0)
+    turns = np.stack([np.linalg.norm(turn[:, part], axis=1) for part in (slice(3), slice(3, 6))], axis=1)
+    reach = np.full(len(u), np.inf)
+    with np.errstate(divide="ignore"):
+        reach[1:-1] = NEARLY / BULGE * (_vectors(allowed[1:-1]) / turns).min(axis=1)
+    return reach
+
+
+def _vectors(allowed: Floats) -> Floats:
+    """Return tolerances of path and axis (N, 2) with the latter as the distance between unit vectors."""
+    return np.stack([allowed[:, 0], np.sin(np.minimum(allowed[:, 1], 0.5 * np.pi))], axis=1)
 
 
 def _too_far(differences: Floats, chords: Floats) -> Bools:

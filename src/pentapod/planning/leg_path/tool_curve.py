@@ -56,7 +56,7 @@ class ToolCurve:
         return self.arc_length(self.curve.x)
 
     def arc_length(self, u: Floats) -> Floats:
-        """Return the station s at spline parameters u that are knots."""
+        """Return the station s at spline parameters u that are knots, and about that at others."""
         nodes = np.append(self.parameter.c[-1], self.curve.x[-1])
         return np.asarray(np.interp(u, nodes, self.parameter.x), dtype=np.float64)
 
