@@ -86,8 +86,8 @@ def test_blocks_find_the_law_of_the_whole(whole):
 
 def test_overlap_of_blocks_grows_until_they_agree(whole):
     s, x, law = whole
-    blocked = limited(s, x, size=2500, overlap=8, blend=4, agreement=2e-6)
-    assert blocked.overlap == 64
+    blocked = limited(s, x, size=2500, overlap=8, blend=4, agreement=2e-7)
+    assert blocked.overlap == 32
     assert duration(blocked) == pytest.approx(duration(law), rel=1e-3)
 
 
