@@ -17,13 +17,11 @@ from pentapod.mesh.mesh import Mesh
 class HeightGridOptions:
     """facets_per_cell: on average. most_entries: of facets in cells; a coarser grid is made where there were more.
 
-    most_pairs: about how many pairs of points and facets are looked at together. sideways: metres to both sides of a
-    point at which `hides` looks.
+    sideways: metres to both sides of a point at which `hides` looks.
     """
 
     facets_per_cell: float = 2.0
     most_entries: int = 20_000_000
-    most_pairs: int = 4_000_000
     sideways: float = 1e-7
 
 
@@ -75,21 +73,12 @@ class HeightField:
         no facet. margin: barycentric tolerance up to which a point beside a facet counts as on it; where it is
         negative, only the interior of facets counts.
         """
-        local = points @ self._frame.T
         surface, normals = np.full((2, len(points), 3), np.nan)
-        heights = np.full(len(points), -np.inf)
-        begin, count = self._facets_near(local[:, :2])
-        # Where many facets stand over each other, the pairs of points and facets would fill the memory.
-        share = np.cumsum(count) // OPTIONS.most_pairs
-        for rows in np.split(np.arange(len(points)), np.flatnonzero(np.diff(share)) + 1):
-            query, facet, weights = self._candidates(local[rows, :2], begin[rows], count[rows], margin)
-            height = (weights * self._local[:, 2][self.mesh.faces[facet]]).sum(axis=1)
-            order = np.lexsort((facet, -height, query))
-            best = order[np.flatnonzero(np.diff(query[order], prepend=-1))]
-            who, what, weight = rows[query[best]], facet[best], weights[best][:, :, None]
-            heights[who] = height[best]
-            surface[who] = (weight * self.mesh.vertices[self.mesh.faces[what]]).sum(axis=1)
-            normals[who] = (weight * self.mesh.corner_normals[what]).sum(axis=1)
+        heights, facets, weights = self._topmost(points, margin)
+        there = np.flatnonzero(facets >= 0)
+        corners, weight = self.mesh.faces[facets[there]], weights[there][:, :, None]
+        surface[there] = (weight * self.mesh.vertices[corners]).sum(axis=1)
+        normals[there] = (weight * self.mesh.corner_normals[facets[there]]).sum(axis=1)
         return surface, normals, heights
 
     def hides(self, points: Floats, slack: float) -> Bools:
@@ -100,7 +89,18 @@ class HeightField:
         """
         sideways = OPTIONS.sideways * (0.83 * self._frame[0] + 0.56 * self._frame[1])
         height = points @ self.view + slack
-        return (self.topmost(points + sideways)[2] > height) & (self.topmost(points - sideways)[2] > height)
+        sides = (self._topmost(points + side, 1e-9)[0] for side in (sideways, -sideways))
+        return np.logical_and(*(above > height for above in sides))
+
+    def _topmost(self, points: Floats, margin: float) -> tuple[Floats, Ints, Floats]:
+        """Return heights (N,) as `topmost`, the facets (N,) there, −1 for none, and the weights (N, 3) on them."""
+        from pentapod.mesh.query.heightfield_kernels import topmost_facets  # noqa: PLC0415  loads numba
+
+        local, count = points @ self._frame.T, len(points)
+        heights, facets, weights = np.empty(count), np.empty(count, dtype=np.intp), np.empty((count, 3))
+        grid = (*self._facets_near(local[:, :2]), self._grid[3])
+        topmost_facets(local, self._local, self.mesh.faces, self._doubled, grid, margin, heights, facets, weights)
+        return heights, facets, weights
 
     def _facets_near(self, points: Floats) -> tuple[Ints, Ints]:
         """Return where the facets of the points' cells begin in the grid's facets, and how many they are (N,)."""
@@ -113,17 +113,6 @@ class HeightField:
         inside = ((index >= 0) & (index < shape)).all(axis=1)
         key = np.where(inside, index[:, 0] * shape[1] + index[:, 1], 0).astype(np.intp)
         return begins[key], np.where(inside, begins[key + 1] - begins[key], 0)
-
-    def _candidates(self, points: Floats, begin: Ints, count: Ints, margin: float) -> tuple[Ints, Ints, Floats]:
-        """Return pairs (M,), (M,) of points and facets over each other, and barycentric weights (M, 3)."""
-        query, number = members(count)
-        facet = self._grid[3][number + begin[query]]
-        a, b, c = (self._local[self.mesh.faces[facet, k]][:, :2] for k in range(3))
-        p, doubled = points[query], self._doubled[facet]
-        weights = np.stack([_cross(c - b, p - b), _cross(a - c, p - c), _cross(b - a, p - a)], axis=1)
-        weights = weights / doubled[:, None]
-        hit = (weights >= -margin).all(axis=1)
-        return query[hit], facet[hit], weights[hit]
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

@@ -102,9 +102,8 @@ def _left(patch: Patch, tree: KDTree, radius: float, height: float, options: Res
     depth, left = radius - height, np.zeros(len(patch.faces))
     if not len(left):
         return left
-    places = corners.mean(axis=1) - depth * normals
-    far = np.asarray(tree.query(places, distance_upper_bound=2.0 * radius)[0])
-    left = np.maximum(np.minimum(far, 2.0 * radius) - radius, 0.0)
+    middles = corners.mean(axis=1)
+    left = _beyond(tree, middles - depth * normals, middles, radius)
     # Between the normals of two facets at a concave edge the ball's arc answers, not the facets.
     a, b = (side // 3 for side in patch.topology.side_pairs)
     edges = patch.vertices[patch.topology.edges[patch.topology.pair_edges]].mean(axis=1)
@@ -114,8 +113,7 @@ def _left(patch: Patch, tree: KDTree, radius: float, height: float, options: Res
     a, b, edges = a[bent], b[bent], edges[bent]
     for share in (0.25, 0.5, 0.75):
         between = normalised((1.0 - share) * normals[a] + share * normals[b])
-        far = np.asarray(tree.query(edges - depth * between, distance_upper_bound=2.0 * radius)[0])
-        more = np.maximum(np.minimum(far, 2.0 * radius) - radius, 0.0)
+        more = _beyond(tree, edges - depth * between, edges, radius)
         np.maximum.at(left, a, more)
         np.maximum.at(left, b, more)
     return np.maximum(left, _left_in_pits(patch, tree, radius, depth, options)[patch.faces].max(axis=1))
@@ -132,9 +130,24 @@ def _left_in_pits(patch: Patch, tree: KDTree, radius: float, depth: float, optio
     least = np.ones(len(mean))
     np.minimum.at(least, corners, np.einsum("ij,ij->i", normals, mean[corners]))
     left, bent = np.zeros(len(mean)), least < np.cos(0.5 * options.bent)
-    far = tree.query(patch.vertices[bent] - depth * mean[bent], distance_upper_bound=2.0 * radius)[0]
-    left[bent] = np.maximum(np.minimum(far, 2.0 * radius) - radius, 0.0)
+    left[bent] = _beyond(tree, patch.vertices[bent] - depth * mean[bent], patch.vertices[bent], radius)
     return left
+
+
+def _beyond(tree: KDTree, places: Floats, above: Floats, radius: float) -> Floats:
+    """Return by how much (N,) places (N, 3) are farther from the tree's points than the radius, up to twice that.
+
+    above (N, 3): on the surface that the tree's points lie on. Of a place below it many points are almost equally far,
+    and the nearest is found slowly; the point that is nearest to `above` mostly tells that none is left.
+    """
+    index = np.asarray(tree.query(above, distance_upper_bound=2.0 * radius)[1])
+    there = np.flatnonzero(index < tree.n)
+    beyond = np.full(len(places), np.inf)
+    beyond[there] = np.linalg.norm(places[there] - tree.data[index[there]], axis=1) - radius
+    doubtful = np.flatnonzero(beyond > 0.0)
+    far = np.asarray(tree.query(places[doubtful], distance_upper_bound=2.0 * radius)[0])
+    beyond[doubtful] = np.minimum(far, 2.0 * radius) - radius
+    return np.maximum(beyond, 0.0)
 
 
 def _grown(patch: Patch, wanted: Bools, rings: int) -> Bools:

@@ -1,0 +1,45 @@
+"""The topmost facet over points of a plane, compiled."""
+
+from __future__ import annotations
+
+import math
+
+from pentapod.base.arrays import Floats, Ints
+from pentapod.numerics.kernels import kernel
+
+
+@kernel
+def topmost_facets(
+    points: Floats,
+    vertices: Floats,
+    faces: Ints,
+    doubled: Floats,
+    grid: tuple[Ints, Ints, Ints],
+    margin: float,
+    heights: Floats,
+    found: Ints,
+    weights: Floats,
+) -> None:
+    """Fill heights (N,), facets (N,) and barycentric weights (N, 3) over points (N, 2); −inf and −1 where none is.
+
+    vertices (V, 3), doubled (F,): twice the facets' areas in the plane, with sign. grid: where the facets near each
+    point begin (N,) and how many they are (N,) in the third. Of facets at one height the first counts.
+    """
+    begins, counts, facets = grid
+    for q in range(len(points)):
+        x, y = points[q, 0], points[q, 1]
+        heights[q], found[q] = -math.inf, -1
+        for k in range(begins[q], begins[q] + counts[q]):
+            f = facets[k]
+            a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+            ax, ay, bx, by = vertices[a, 0], vertices[a, 1], vertices[b, 0], vertices[b, 1]
+            cx, cy, area = vertices[c, 0], vertices[c, 1], doubled[f]
+            first = ((cx - bx) * (y - by) - (cy - by) * (x - bx)) / area
+            second = ((ax - cx) * (y - cy) - (ay - cy) * (x - cx)) / area
+            third = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / area
+            if not (first >= -margin and second >= -margin and third >= -margin):
+                continue
+            height = first * vertices[a, 2] + second * vertices[b, 2] + third * vertices[c, 2]
+            if height > heights[q] or (height == heights[q] and f < found[q]):
+                heights[q], found[q] = height, f
+                weights[q, 0], weights[q, 1], weights[q, 2] = first, second, third
