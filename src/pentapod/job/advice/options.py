@@ -18,9 +18,10 @@ class AdviceOptions(Value):
     the region. setups: numbers of set-ups. lengths: of the tool, as shares of the machine's. first, halvings: first
     share of the extents, and steps of the bisection, for the largest box. most: share of the area from which a region
     counts as all. hole: width about a part's middle without surface, as a share of its largest extent, from which boxes
-    are elsewhere. top_deg: angle of the region within which a place is flat, where only the top is tried. flat: height,
-    as a share of the largest extent, below which a box keeps it. least: smallest extent of a box, and smallest scale,
-    as shares of what is within reach. spare: share of the extent, or of the scale, that is found and taken; the
+    are elsewhere. top_deg: angle of the region within which a place is flat, where only the top is tried; shallow:
+    first depth of it, as a share of the region's. flat: height, as a share of the largest extent, below which a box
+    keeps it. least: smallest extent of a box, and smallest scale, as shares of what is within reach. spare: share of
+    the extent, or of the scale, that is found and taken; the
     estimate looks at few points. smaller: factor on the extent of a second, smaller box. doubtful: width of a part, as
     a multiple of the work volume's, beyond which its unit is doubted. strategies: that are tried where another makes no
     toolpath. worth_length: what another tool counts beside a region that keeps a share of the area. other_face_deg:
@@ -46,6 +47,7 @@ class AdviceOptions(Value):
     most: float = 0.999
     hole: float = 0.2
     top_deg: float = 40.0
+    shallow: float = 0.2
     flat: float = 0.1
     least: float = 0.1
     spare: float = 0.97

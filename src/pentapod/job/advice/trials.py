@@ -59,11 +59,15 @@ class Trials:
             limits = "; ".join(f"{each.constraint} by {each.shortfall:.3g} {each.unit}" for each in short[:2])
             self.because(f"no pose of the tool was found, whatever the part: {limits}; it is the machine, or the tool")
             return
+        touching = next((setting for setting in settings.looked_at if setting.touches), None)
         for base in bases:
             yield from self._smaller(base)
+        if touching is not None:
+            yield from self._top(touching)
         if bases:
             yield from self._scales(bases[0])
-        if (nearest := settings.nearest) is not None and (short := nearest.found.shortfalls):
+        nearest = touching or settings.nearest
+        if nearest is not None and (short := nearest.found.shortfalls):
             words = nearest.words or "the job as it is"
             self.because(f"{words} came nearest: {short[0].constraint} by {short[0].shortfall:.3g} {short[0].unit}")
 
@@ -115,7 +119,7 @@ class Trials:
         yield from (trial for trial in regions if trial.worth < self.options.worth_length)
 
     def _regions(self, base: Setting) -> list[Trial]:
-        """Return the largest smaller regions that fit: flatter ones, boxes, and the top where a tool is too wide."""
+        """Return the largest smaller regions that fit: flatter ones, and boxes."""
         regions = self._all_regions
         if regions is None:
             return []
@@ -134,23 +138,29 @@ class Trials:
         self.settings.tell("a smaller region_box_mm")
         for deep in (False, True):
             found += self._boxes(base, lambda share, deep=deep: regions.boxed(share, deep=deep))
-        if base.touches:
-            self.settings.tell("only the top")
-            found += self._boxes(base, regions.top)
         return [self._of_region(base, smaller) for smaller in found]
+
+    def _top(self, base: Setting) -> Iterator[Trial]:
+        """Yield the flat top of the part: shank or holder may have room there, where they touch the part elsewhere."""
+        if (regions := self._all_regions) is not None:
+            self.settings.tell("only what is flat at the top")
+            for smaller in self._boxes(base, regions.top, self.options.shallow):
+                yield self._of_region(base, smaller)
 
     def _of_region(self, base: Setting, smaller: Smaller) -> Trial:
         changes, words = merged(base.changes, smaller.changes), joined(smaller.words, base.words)
         return Trial(words, changes, smaller.share, smaller.share)
 
-    def _boxes(self, base: Setting, boxed: Callable[[float], Smaller | None]) -> list[Smaller]:
+    def _boxes(
+        self, base: Setting, boxed: Callable[[float], Smaller | None], first: float | None = None
+    ) -> list[Smaller]:
         """Return about the largest box that fits, by bisection, and a smaller one, in case its plan fails."""
 
         def estimated(share: float, near: Estimate | None) -> Estimate | None:
             smaller = boxed(share)
             return None if smaller is None else self.settings.less(base, smaller.sketch, near)
 
-        fits = self.settings.largest(estimated, self.options.first)
+        fits = self.settings.largest(estimated, first or self.options.first)
         if fits == 0.0:
             return []
         boxes = (boxed(factor * fits) for factor in (self.options.spare, self.options.smaller))

@@ -99,8 +99,9 @@ def tool_in_world(job: Job, machine: Machine | None = None) -> Tool:
         if tool.stem is not None:
             return dataclasses.replace(tool, flute=None)
         end = BallCutter(tool.radius)
-        beside = Cone(tool.flute - end.solids[-1].top, tool.radius, tool.radius)
-        if beside.height > 0.0:
+        height = tool.flute - end.solids[-1].top
+        if height > 0.0:
+            beside = Cone(height, tool.radius, tool.radius)
             return dataclasses.replace(end, shank=(beside, *tool.shank), holder=tool.holder)
     return tool
 
