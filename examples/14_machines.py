@@ -4,7 +4,7 @@
 
 Each column is a machine of `pentapod machine list`, drawn to one scale from above and from the side, with legs and
 tool in the middle of the work volume (shaded), and in the pose of its boundary with the largest force in the legs
-(dashed). Printed are the figures that the design search of `01_design_a_machine.py` weighs.
+(dashed). Printed are the figures that a search for a machine weighs.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from designs import geometry_of
 
+from designs import geometry_of
 from pentapod.design.bounds import Boxes
 from pentapod.design.figures import in_poses
 from pentapod.design.proof import FORCES, SHAPE, ProofOptions, bounds_of_forces, bounds_of_shape, prove

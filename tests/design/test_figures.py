@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from designs import geometry_of
 
-from pentapod.design.evaluation import evaluate, first_sample
+from designs import geometry_of
 from pentapod.design.design_file import DesignFile
+from pentapod.design.evaluation import evaluate, first_sample
 from pentapod.design.figures import in_poses
 from pentapod.design.geometry import rim
 from pentapod.design.part_poses import PartPoses

@@ -68,9 +68,8 @@ def test_evaluations_of_another_version_are_not_taken(design_file, tmp_path):
 @pytest.fixture
 def narrow(design_file):
     """A file whose proofs are quick: a small work volume."""
-    path = design_file(("centre_z_mm = [350, 800]", "diameter_mm = [9, 10]\nheight_mm = [4, 5]\ntilt_deg = [5, 6]"),
+    return design_file(("centre_z_mm = [350, 800]", "diameter_mm = [9, 10]\nheight_mm = [4, 5]\ntilt_deg = [5, 6]"),
                        ("amplification = 5.3", "amplification = 4.9"))  # fmt: skip
-    return path
 
 
 def test_command_writes_machines_that_hold(narrow, tmp_path, capsys):

@@ -18,6 +18,7 @@ import pytest
 from pentapod.base.files import sha256_of
 from pentapod.batch import Store, Sweep
 from pentapod.cli.main import run
+from pentapod.design.design_file import DesignFile
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job
 from pentapod.kinematics import Component
@@ -26,7 +27,7 @@ from pentapod.program import Program, Provenance, write_csv
 
 ROOT = Path(__file__).parents[2]
 MACHINE_TABLES = ["calibration", "guides", "leg_model"]
-LONG = ("setups", "register", "many-jobs")
+LONG = ("setups", "register", "many-jobs", "design")
 GUIDES = [*sorted(ROOT.glob("docs/howto/*.md")), ROOT / "docs" / "tutorial.md"]
 
 
@@ -53,6 +54,9 @@ def test_the_reference_is_what_the_code_says():
 def test_every_command_runs_as_written(page, tmp_path, monkeypatch):
     shutil.copytree(ROOT / "toolpaths", tmp_path / "toolpaths")
     monkeypatch.chdir(tmp_path)
+    for block in blocks(page, "toml"):
+        if block.startswith("[start]"):
+            (tmp_path / "design.toml").write_text(block, encoding="utf-8")
     for line in "".join(blocks(page, "sh")).splitlines():
         words = shlex.split(line)
         assert words[0] == "pentapod"
@@ -99,6 +103,11 @@ def test_every_table_of_a_job_is_one(page, tmp_path):
             continue
         table = re.match(r"\[([^\]]+)\]\n", block)
         if table[1].startswith("project."):
+            continue
+        if table[1] == "start":
+            shutil.copytree(ROOT / "toolpaths", tmp_path / "toolpaths")
+            (tmp_path / "design.toml").write_text(block, encoding="utf-8")
+            assert DesignFile.load(tmp_path / "design.toml").jobs
             continue
         if table[1] in MACHINE_TABLES:
             own = tmp_path / "own_machine.toml"

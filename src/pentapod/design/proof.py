@@ -33,7 +33,7 @@ class ProofOptions:
     angle: float = 2e-3
     clearance: float = 1e-4
     singular: float = 1e-3
-    force: float = 5e-3
+    force: float = 2e-3
     reserve: float = 1.5
     around: int = 24
     levels: int = 3

@@ -103,21 +103,22 @@ def search(file: DesignFile, folder: Path, pool: Executor | None = None, progres
         Evaluator(skip_already_evaluated=False).eval(static, designs, skip_already_evaluated=False)
         designs.set("values", values)
 
-    generation = 0
-    while algorithm.has_next():
+    for generation in range(1, asked.generations + 1):
         with np.errstate(all="ignore"):  # its crossover
             designs = algorithm.ask()
             judged(designs)
             algorithm.tell(infills=designs)
-        generation += 1
         last = generation == asked.generations
-        if generation % asked.exchange == 0 or last:
-            unit = _exchanged(file, sample, algorithm.pop, pool)
-            if len(unit) > len(sample.unit):
-                sample = replace(sample, unit=unit)
-                judged(algorithm.pop)
-                again = {"algorithm": algorithm, "random_state": algorithm.random_state}
-                algorithm.pop = algorithm.survival.do(problem, algorithm.pop, n_survive=asked.population, **again)
+        while last or generation % asked.exchange == 0:
+            unit = _exchanged(file, sample, algorithm.pop, pool, everyone=last)
+            if len(unit) == len(sample.unit):
+                break
+            sample = replace(sample, unit=unit)
+            judged(algorithm.pop)
+            again = {"algorithm": algorithm, "random_state": algorithm.random_state}
+            algorithm.pop = algorithm.survival.do(problem, algorithm.pop, n_survive=asked.population, **again)
+            if not last:
+                break
         progress("search", generation / asked.generations, _note(file, algorithm.pop, log.count))
     rows = _front(file, algorithm.pop)
     vectors, values = (np.array(algorithm.pop.get(name), dtype=np.float64) for name in ("X", "values"))
@@ -156,10 +157,10 @@ def undominated(goals: Floats) -> Bools:
     return ~(worse | same).any(axis=1)
 
 
-def _exchanged(file: DesignFile, sample: Sample, designs: Any, pool: Executor | None) -> Floats:
-    """Return the sample's unit poses with the worst poses of the best designs."""
+def _exchanged(file: DesignFile, sample: Sample, designs: Any, pool: Executor | None, *, everyone: bool) -> Floats:
+    """Return the sample's unit poses with the worst poses of the best designs; everyone: of all on the front."""
     rows = _front(file, designs) or np.argsort(designs.get("CV").ravel(), kind="stable").tolist()
-    even = np.unique(np.linspace(0, len(rows) - 1, min(WATCHED, len(rows))).astype(int))
+    even = np.unique(np.linspace(0, len(rows) - 1, len(rows) if everyone else min(WATCHED, len(rows))).astype(int))
     vectors = np.array(designs.get("X"), dtype=np.float64)[[rows[k] for k in even]]
     work = partial(worst_poses, sample)
     found = map(work, vectors) if pool is None else pool.map(work, vectors)

@@ -40,7 +40,9 @@ def design(file: Path, out: Path, workers: int | None, as_json: bool, quiet: boo
         echo_json({**to_dict(front), "out": str(out)})
     elif not quiet:
         count = len(front.members)
-        lines = [f"{front.designs:,} evaluations; of {count + len(front.dropped)} designs that were tried, {count} hold"]
+        lines = [
+            f"{front.designs:,} evaluations; of {count + len(front.dropped)} designs that were tried, {count} hold"
+        ]
         for number, member in enumerate(front.members, start=1):
             lines.append(f"  {folder_of(number)}: {headline(front, member)}")
             lines += [f"    {job}: {said}" for job, _, said in member.parts]
