@@ -59,7 +59,7 @@ def test_errors_name_the_place(design_file, replaced, message):
 
 def test_a_stiffness_that_is_asked_needs_that_of_a_leg(design_file):
     path = design_file(("leg_stiffness_n_um = 50", ""), ("clearance_mm = 2", "stiffness_n_um = 2"))
-    with pytest.raises(InputError, match="start.leg_stiffness_n_um: the key is missing"):
+    with pytest.raises(InputError, match=r"start\.leg_stiffness_n_um: the key is missing"):
         DesignFile.load(path)
 
 

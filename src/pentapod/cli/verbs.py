@@ -23,7 +23,7 @@ VERBS = {
     "calibrate": "pentapod.cli.commands.calibrate:calibrate",
     "ik": "pentapod.cli.commands.kinematics:ik",
     "fk": "pentapod.cli.commands.kinematics:fk",
-    "design": "pentapod.cli.commands.design:design",
+    "design": "pentapod.cli.studies.design:design",
     "modes": "pentapod.cli.commands.modes:modes",
     "new": "pentapod.cli.commands.new:new",
     "warm-up": "pentapod.cli.commands.warm_up:warm_up",
