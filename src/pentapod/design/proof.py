@@ -177,7 +177,7 @@ def _start(design: Geometry) -> tuple[Floats, Floats]:
     )  # fmt: skip
     halves = [0.5 * (high - low) / parts for low, high, parts in sides]
     middles = [low + half * (2.0 * np.arange(parts) + 1.0) for (low, _, parts), half in zip(sides, halves, strict=True)]
-    centre = np.stack([axis.ravel() for axis in np.meshgrid(*middles, indexing="ij")], axis=-1)
+    centre = np.stack([axis.ravel() for axis in np.meshgrid(*middles, indexing="ij")], axis=-1, dtype=np.float64)
     return centre, np.broadcast_to(halves, centre.shape).copy()
 
 

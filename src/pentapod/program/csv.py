@@ -67,7 +67,7 @@ def _pieces(program: Program) -> Iterator[bytes]:
     for start in range(0, len(program.legs), ROWS_AT_ONCE):
         legs = to_millimetres(program.legs[start : start + ROWS_AT_ONCE])
         times = np.arange(start, start + len(legs)) * program.period
-        yield rows_text(np.column_stack([times, legs]), decimals)
+        yield rows_text(np.concatenate([times[:, None], legs], axis=1, dtype=np.float64), decimals)
 
 
 def _time_decimals(period: float) -> int:

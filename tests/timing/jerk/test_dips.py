@@ -22,7 +22,9 @@ def parabola(lowest, least):
     a, b, c = knots[1:-3], knots[2:-2], knots[3:-1]
     y = (a * b + b * c + c * a) / 3.0 - 2.0 * lowest * (a + b + c) / 3.0 + lowest**2 + least
     one = np.ones(len(GRID))
-    return Subproblem(GRID, knots, basis, first, NO_ROWS, one, one, one, NO_ROWS.jerks, End(), End(), 1.0, JerkOptions()), y
+    return Subproblem(
+        GRID, knots, basis, first, NO_ROWS, one, one, one, NO_ROWS.jerks, End(), End(), 1.0, JerkOptions()
+    ), y
 
 
 def test_a_law_goes_on_where_its_spline_dips_below_zero_between_gridpoints():

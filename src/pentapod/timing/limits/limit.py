@@ -105,8 +105,8 @@ def acceleration_ceiling(
 
     size, x = np.array(np.broadcast_to(size, first.shape[1]), dtype=np.float64), np.empty(len(first))
     offset = np.zeros((1, first.shape[1])) if offset is None else offset
-    plain = (np.require(y, np.float64, ["C", "W"]) for y in (first, second, offset))
-    largest_x(*plain, int(len(offset) > 1), size, x)
+    first, second, offset = (np.require(y, np.float64, ["C", "W"]) for y in (first, second, offset))
+    largest_x(first, second, offset, int(len(offset) > 1), size, x)
     return x
 
 
