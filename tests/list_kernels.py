@@ -41,6 +41,8 @@ def found(cache: Path) -> dict[str, list[list[Any]]]:
     listed: dict[str, list[list[Any]]] = {}
     for index in sorted(cache.rglob("*.nbi")):
         module, name = index.name.split(".")[0], index.name.split(".")[1].rpartition("-")[0]
+        if module not in modules:
+            continue  # of a test
         (source,) = (f for f in modules[module] if f.parent.name == index.parent.name.rpartition("_")[0])
         if name.startswith("_"):
             continue

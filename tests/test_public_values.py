@@ -128,6 +128,7 @@ BY_HAND = [
     pentapod.PolylineOptions(lines=[np.array([[0.0, 0, 0], [0.01, 0, 0]])]),
     pentapod.ImageOptions(darkness=np.ones((2, 2)), width=0.01, stepover=1e-3),
     pentapod.Region(),
+    pentapod.Sweep(Path("sweep.toml"), (), (), ""),
     pentapod.Certificate("feed", False, 1.0, 2.0, "mm/s", Place(1.0, 2, 3), "measured"),
     NotJudged("gouge", "nobody said"),
     Refusal("placement", "it does not fit", remedy="a smaller part"),
@@ -296,7 +297,7 @@ def test_notebooks_show_small_escaped_html_without_colours_of_its_own(reached):
     verdict = Verdict((failed,) * 40, (NotJudged("gouge", 'no "mesh"'),))
     for value, words in (
         (reached.find(Toolpath), "284 waypoints"),
-        (reached.find(Program), "8,212"),
+        (reached.find(Program), f"{len(reached.find(Program).legs):,}"),
         (reached.verdict, "passed"),
         (verdict, "<b>claim</b> & co"),
     ):

@@ -33,7 +33,7 @@ LOG = "log.jsonl"
 
 
 @dataclass(frozen=True)
-class EngineOptions:
+class EngineOptions(Value):
     """How tasks are run, and how often again.
 
     memory: bytes that the process of a task may use; a task that needs more counts as crashed. tries: runs beside

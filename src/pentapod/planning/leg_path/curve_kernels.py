@@ -38,7 +38,7 @@ def _tool(curve: Floats, part: int, h: float, tilt_centre: float, order: int, ti
     for c in range(3):
         for rows, column in ((tip, c), (axis, 3 + c)):
             v0, v1, v2, v3 = curve[part, 0, column], 0.0, 0.0, 0.0
-            for m in range(1, 5):
+            for m in range(1, curve.shape[1]):
                 if order >= 2:
                     v3 = v3 * h + v2
                     v2 = v2 * h + v1

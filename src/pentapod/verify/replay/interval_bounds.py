@@ -21,6 +21,9 @@ from pentapod.numerics.blocks import blocks
 from pentapod.numerics.threads import in_threads
 from pentapod.program.program import Program
 
+LEG_MEASURES = 5
+"""Measures of the legs: shortest, longest, rate, acceleration, jerk."""
+
 
 class RunningMaximum:
     """The largest values (d,) of d measures over the program, and the places `at` (d,) where they are."""
@@ -169,7 +172,8 @@ class _Block:
         wide = Interpolant.along(program.legs[rows], None if slopes is None else slopes[rows], program.period).bernstein
         inner = slice(intervals.start - low, intervals.stop - low)
         part, robot = wide[inner], machine.robot
-        legs = np.full((5, robot.n_legs), -np.inf), np.zeros((5, robot.n_legs), dtype=np.intp)
+        extents = (LEG_MEASURES, robot.n_legs)
+        legs = np.full(extents, -np.inf), np.zeros(extents, dtype=np.intp)
         extremes(wide, inner.start, inner.stop, intervals.start, program.period, *legs)
         halves, samples = np.empty((2 * len(part), *part.shape[1:])), np.empty((2 * len(part) + 1, part.shape[1]))
         halve(part, halves, samples)

@@ -31,14 +31,14 @@ def halve(bernstein: Floats, halves: Floats, samples: Floats) -> None:
 
 @kernel
 def extremes(wide: Floats, first: int, last: int, number: int, period: float, values: Floats, at: Ints) -> None:
-    """Raise values (5, d) to the largest measures of intervals first to last of polynomials (N, d, k + 1), k 1 or 3.
+    """Raise values (m, d) to the largest measures of intervals first to last of polynomials (N, d, k + 1), k 1 or 3.
 
-    at (5, d): becomes their intervals, or rows, counted from `number` on; of equal ones the first counts. The measures
+    at (m, d): becomes their intervals, or rows, counted from `number` on; of equal ones the first counts. The measures
     are the negative least value, the largest, the largest |rate|, |acceleration| at the rows, |jerk|; as those of
     `Interpolant`, at rest before the first polynomial and after the last.
     """
     count, columns = wide.shape[0], wide.shape[1]
-    found = np.empty(5)
+    found = np.empty(len(values))
     for j in range(columns):
         before = _acceleration(wide, first, j, period)
         for i in range(first, last + 1):
@@ -54,7 +54,7 @@ def extremes(wide: Floats, first: int, last: int, number: int, period: float, va
                     jerk = max(jerk, abs(after))
                 found[4] = jerk / period
             found[3] = abs(before)
-            for k in range(5):
+            for k in range(len(values)):
                 if (i < last or k == 3) and found[k] > values[k, j]:
                     values[k, j], at[k, j] = found[k], number + i - first
             before = after
