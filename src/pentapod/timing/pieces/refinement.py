@@ -24,6 +24,7 @@ class RefinementOptions:
     rescalings: int = 3  # how often limits are lowered after that, where they are still exceeded
     room: float = 0.998  # share of a limit that is aimed at there
     switching_loss: float = 3e-4  # share of the duration that may be lost in stages within which the law should switch
+    stage_loss: float = 2e-3  # seconds above which a single stage is divided however little that is of the duration
     long_grid: float = 4000.0  # gridpoints above which more may be lost: solving again costs more than it finds
     most_loss: float = 6.0  # largest factor on that share
 
@@ -82,7 +83,7 @@ def _switching(profile: PieceProfile, options: RefinementOptions) -> tuple[Bools
 
     In a stage of an optimal law either an acceleration is at its limit or the speed is at its ceiling at both ends.
     Where neither is, time is lost: at most what running at the faster end's speed would save. None are returned
-    where that adds up to little. A stage that ends at the ceiling and uses the share r of the acceleration limit
+    where that adds up to little, but those that lose as long as a slower feed is seen. A stage that ends at the ceiling and uses the share r of the acceleration limit
     could get there within about the fraction r of its length.
     """
     u, ds, x, rows = profile.path_accelerations(), np.diff(profile.s), profile.x, profile.rows()
@@ -100,7 +101,7 @@ def _switching(profile: PieceProfile, options: RefinementOptions) -> tuple[Bools
     allowed = options.switching_loss * seconds.sum()
     worth = loss > 0.1 * options.switching_loss * seconds.sum()
     if loss.sum() <= allowed * min(max(len(x) / options.long_grid, 1.0), options.most_loss):
-        worth[:] = False
+        worth = loss > options.stage_loss
     near = (capped[:-1] | capped[1:]) & (share > 1e-3) & (share < 0.6)
     return worth, np.where(near, np.where(u > 0.0, share, 1.0 - share), 0.5)
 

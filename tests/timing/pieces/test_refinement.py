@@ -1,0 +1,45 @@
+"""Grid refinement of a piece: no stage is slow for long without a limit, however long the whole piece takes."""
+
+import numpy as np
+from scipy.special import erf
+from timing_paths import Piece, machine
+
+from pentapod.timing.limits.limit import Motion
+from pentapod.timing.limits.limits import Limits
+from pentapod.timing.pieces.refinement import time_piece
+
+LENGTH, BEND, WIDTH, TURN = 3.0, 1.4003, 1e-6, 1e6
+
+
+def bent():
+    """Legs of a long straight way with one sharp bend far from any knot of a grid that is even."""
+    rate = np.array([1.0, 0.8, -0.6, 0.3, -0.9])
+
+    def legs(s):
+        t = (s - BEND) / (2.0**0.5 * WIDTH)
+        turned = WIDTH * (np.pi / 2.0) ** 0.5 * (1.0 + erf(t))
+        first = rate * (1.0 + TURN * turned[:, None])
+        way = (s - BEND) * turned + WIDTH**2 * np.exp(-(t**2))
+        return 0.8 + rate * (s + TURN * way)[:, None], first, rate * (TURN * np.exp(-(t**2)))[:, None]
+
+    return Piece(
+        legs, LENGTH, 0.025, inner_knots=(BEND - 1.4e-3, BEND - 20.0 * WIDTH, BEND, BEND + 20.0 * WIDTH, BEND + 1.4e-3)
+    )
+
+
+def test_no_stage_is_slow_for_long_without_a_limit():
+    piece, m = bent(), machine(a=5.0)
+    profile = time_piece(piece, Limits.of(m, velocity_margin=1e-3, acceleration_margin=1e-3, guard=0.0), 1e-3, 1e-3)
+    x, s = profile.x, profile.s
+    pushes = np.diff(x) / (2.0 * np.diff(s))
+    shares = np.maximum(
+        *(
+            profile.limits.shares(profile.derivatives, Motion.of(x, u))
+            for u in (np.append(pushes, 0), np.append(0, pushes))
+        )
+    ).max(axis=1)
+    free = (shares[:-1] < 0.98) & (shares[1:] < 0.98)
+    seconds = 2.0 * np.diff(s) / (np.sqrt(x[:-1]) + np.sqrt(x[1:]))
+    lost = np.where(free, seconds - np.diff(s) / 0.025, 0.0)
+    assert np.sqrt(x[np.searchsorted(s, BEND)]) < 0.02
+    assert lost.max() < 4e-3
