@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints, row_maxima
+from pentapod.base.arrays import Bools, Floats, Ints, row_maxima
 from pentapod.timing.limits.limit import AccelerationRows, Motion
 from pentapod.timing.limits.limits import Limits
 from pentapod.timing.path.path import PathDerivatives, PieceLike
@@ -57,6 +57,12 @@ class PieceProfile:
     def ceiling(self) -> Floats:
         """Return the largest x (N + 1,) at each gridpoint that any path acceleration allows, m²/s²."""
         return self.full_ceiling * self.speed_scale**2
+
+    def ceiling_inside(self, stages: Bools) -> Floats:
+        """Return the largest x in the middle of some stages (N,)."""
+        k = np.flatnonzero(stages)
+        path = PathDerivatives(self.piece, (self.s[k] + self.s[k + 1]) / 2.0)
+        return self.limits.ceiling(path) * np.minimum(self.speed_scale[k], self.speed_scale[k + 1]) ** 2
 
     def rows(self) -> AccelerationRows:
         """Return the scaled rows (N + 1, R) of the accelerations at the gridpoints."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, row_maxima
-from pentapod.timing.limits.limit import share_of_room
+from pentapod.timing.limits.limit import AccelerationRows, share_of_room
 from pentapod.timing.limits.limits import Limits
 from pentapod.timing.path.path import PieceLike
 from pentapod.timing.pieces.grid import first_grid
@@ -81,10 +81,11 @@ def _refined(profile: PieceProfile, exceeding: Bools, switching: Bools, where: F
 def _switching(profile: PieceProfile, options: RefinementOptions) -> tuple[Bools, Floats]:
     """Return the stages (N,) within which the law should switch, and at which fraction (N,).
 
-    In a stage of an optimal law either an acceleration is at its limit or the speed is at its ceiling at both ends.
-    Where neither is, time is lost: at most what running at the faster end's speed would save. None are returned
-    where that adds up to little, but those that lose as long as a slower feed is seen. A stage that ends at the ceiling and uses the share r of the acceleration limit
-    could get there within about the fraction r of its length.
+    In a stage of an optimal law either an acceleration is at its limit or the speed is at its ceiling. Where neither
+    is, time is lost: at most what running as fast as the ceiling, or a push up and one down, allow would save. None are
+    returned where that adds up to little, but those that lose as long as a slower feed is seen. A stage that ends at
+    the ceiling and uses the share r of the acceleration limit could get there within about the fraction r of its
+    length.
     """
     u, ds, x, rows = profile.path_accelerations(), np.diff(profile.s), profile.x, profile.rows()
     offset = np.broadcast_to(rows.offset, rows.first.shape)
@@ -94,16 +95,27 @@ def _switching(profile: PieceProfile, options: RefinementOptions) -> tuple[Bools
     ]
     capped = x > 0.99 * profile.ceiling()
     share = row_maxima(np.maximum(*ends))
-    idle = (share < 0.98) & ~(capped[:-1] & capped[1:])
+    idle = share < 0.98
+    top = np.maximum(x[:-1], x[1:])
+    top[idle] = np.maximum(top[idle], np.minimum(profile.ceiling_inside(idle), _peak(profile, rows, idle)))
     speed = np.sqrt(x)
     seconds = 2.0 * ds / (speed[:-1] + speed[1:])
-    loss = np.where(idle, seconds - ds / np.maximum(speed[:-1], speed[1:]), 0.0)
+    loss = np.where(idle, seconds - ds / np.sqrt(top), 0.0)
     allowed = options.switching_loss * seconds.sum()
     worth = loss > 0.1 * options.switching_loss * seconds.sum()
     if loss.sum() <= allowed * min(max(len(x) / options.long_grid, 1.0), options.most_loss):
         worth = loss > options.stage_loss
-    near = (capped[:-1] | capped[1:]) & (share > 1e-3) & (share < 0.6)
+    near = (capped[:-1] ^ capped[1:]) & (share > 1e-3) & (share < 0.6)
     return worth, np.where(near, np.where(u > 0.0, share, 1.0 - share), 0.5)
+
+
+def _peak(profile: PieceProfile, rows: AccelerationRows, which: Bools) -> Floats:
+    """Return the largest x in stages, by a push from their start on and one back to their end."""
+    x, k = profile.x, np.flatnonzero(which)
+    room = 1.0 - np.abs(rows.second[k] * x[k][:, None] + (rows.offset if len(rows.offset) == 1 else rows.offset[k]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        push = np.nan_to_num(np.maximum(room, 0.0) / np.abs(rows.first[k]), nan=np.inf, posinf=np.inf).min(axis=1)
+    return (x[k] + x[k + 1]) / 2.0 + push * (profile.s[k + 1] - profile.s[k])
 
 
 def _at_ends(shares: Floats, bad: Bools, room: float) -> Floats:
