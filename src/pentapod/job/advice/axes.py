@@ -64,6 +64,13 @@ def axis_choices(
             found.append(AxisChoice(words, further, lambda s: leaning(s.samples(s.normals, 0.0), lean, constraints)))
     else:
         found = [AxisChoice("", {}, lambda s: [s.samples(s.axes, own)])]
+        if own > 0.0:
+            # Beside a wall the stem is clear of it only upright; a raster does not cover all of a wall.
+            words, upright = "the tool does not lean", {"axis": {"tilt_deg": 0.0}}
+            if getattr(job.toolpath, "steep_deg", options.steep_deg) is None:
+                words += ", waterlines on what is steep"
+                upright |= {"toolpath": {"steep_deg": options.steep_deg}}
+            found.append(AxisChoice(words, upright, lambda s: [s.samples(s.axes, 0.0)], narrow=True))
     if job.toolpath.strategy != FILE:
         usual = AxisKeys().tilt if tool.can_tilt else 0.0
         # A cone that is given may be too narrow, or too wide for a tool that cannot tilt.

@@ -110,8 +110,10 @@ class FailedClaims:
                 return
 
     def _finer(self) -> Iterator[tuple[str, Changes]]:
-        """Yield passes nearer together, with the same bound of what is left, and a smaller cutter."""
+        """Yield waterlines on walls, passes nearer together with the same bound of what is left, a smaller cutter."""
         table = self.job.toolpath
+        if getattr(table, "steep_deg", self.options.steep_deg) is None:
+            yield "waterlines on what is steep", {"toolpath": {"steep_deg": self.options.steep_deg}}
         key = "stepover_mm" if getattr(table, "stepover_mm", None) is not None else "scallop_mm"
         if getattr(table, key, None) is None:
             return

@@ -25,10 +25,11 @@ class AdviceOptions(Value):
     estimate looks at few points. smaller: factor on the extent of a second, smaller box. doubtful: width of a part, as
     a multiple of the work volume's, beyond which its unit is doubted. strategies: that are tried where another makes no
     toolpath. worth_length: what another tool counts beside a region that keeps a share of the area. other_face_deg:
-    turn of a part on a table from which it lies on another face. Where a program fails its verdict: nearer, thinner,
-    slower: factors on the distance between passes, on the cutter's diameter (with that distance), and on the feed;
-    surface_points: of the region, at which it is estimated what is left; near_share: steps along the toolpath, in radii
-    of the ball; surely: share of what may be left that the estimate must keep to.
+    turn of a part on a table from which it lies on another face. steep_deg: slope from which walls get waterlines.
+    Where a program fails its verdict: nearer, thinner, slower: factors on the distance between passes, on the cutter's
+    diameter (with that distance), and on the feed; surface_points: of the region, at which it is estimated what is
+    left; near_share: steps along the toolpath, in radii of the ball; surely: share of what may be left that the
+    estimate must keep to.
     """
 
     wanted: int = 1
@@ -39,6 +40,7 @@ class AdviceOptions(Value):
     comfortable: float = 0.15
     failures: int = 2
     cones_deg: tuple[float, ...] = (20.0, 30.0, 45.0)
+    steep_deg: float = 60.0
     angles_deg: tuple[float, ...] = (80.0, 70.0, 60.0, 50.0, 40.0, 30.0, 20.0, 10.0)
     setups: tuple[int, ...] = (2, 3, 4)
     lengths: tuple[float, ...] = (0.7, 1.3, 0.5, 1.6)

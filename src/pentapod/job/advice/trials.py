@@ -87,7 +87,8 @@ class Trials:
                 scant.append(setting)
             else:
                 yield Trial(setting.words, setting.changes, 1.0, 1.0)
-        for setting in sorted(scant, key=lambda s: -s.found.margin):
+        # Of about the same margin, those count that are cheap to plan.
+        for setting in sorted(scant, key=lambda s: -round(s.found.margin, 2)):
             yield Trial(setting.words, setting.changes, 1.0, 1.0)
 
     def _bases(self) -> list[Setting]:
