@@ -67,7 +67,9 @@ def axis_choices(
         if own > 0.0:
             # Beside a wall the stem is clear of it only upright; a raster does not cover all of a wall.
             words, upright = "the tool does not lean", {"axis": {"tilt_deg": 0.0}}
-            if getattr(job.toolpath, "steep_deg", options.steep_deg) is None:
+            slopes = angle_between(sketch.normals, normalised(job.part.si.region_direction))
+            walls = bool((slopes > to_si(options.steep_deg, "deg")).any())
+            if walls and getattr(job.toolpath, "steep_deg", options.steep_deg) is None:
                 words += ", waterlines on what is steep"
                 upright |= {"toolpath": {"steep_deg": options.steep_deg}}
             found.append(AxisChoice(words, upright, lambda s: [s.samples(s.axes, 0.0)], narrow=True))

@@ -16,9 +16,10 @@ from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError
-from pentapod.base.units import from_si
+from pentapod.base.units import from_si, to_si
 from pentapod.cutters.mounted import BallEnded
 from pentapod.cutters.tool import Tool
+from pentapod.geometry.directions import normalised
 from pentapod.geometry.polyline import spaced
 from pentapod.job.advice.axes import Changes
 from pentapod.job.advice.options import AdviceOptions
@@ -112,8 +113,11 @@ class FailedClaims:
     def _finer(self) -> Iterator[tuple[str, Changes]]:
         """Yield waterlines on walls, passes nearer together with the same bound of what is left, a smaller cutter."""
         table = self.job.toolpath
-        if getattr(table, "steep_deg", self.options.steep_deg) is None:
-            yield "waterlines on what is steep", {"toolpath": {"steep_deg": self.options.steep_deg}}
+        region, steep = self._coverage.region, self.options.steep_deg
+        view = normalised(self.job.part.si.region_direction)
+        walls = None if region is None else region.steeper(view, to_si(steep, "deg"))
+        if walls is not None and len(walls.faces) and getattr(table, "steep_deg", steep) is None:
+            yield "waterlines on what is steep", {"toolpath": {"steep_deg": steep}}
         key = "stepover_mm" if getattr(table, "stepover_mm", None) is not None else "scallop_mm"
         if getattr(table, key, None) is None:
             return

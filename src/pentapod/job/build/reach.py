@@ -40,7 +40,8 @@ def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
     key, remedy = "scale", "scale = 0.001 if the numbers are millimetres, not metres"
     if not states_unit(job.mesh_path):
         known = UNITS[job.part.unit]
-        unit = min(UNITS, key=lambda name: abs(np.log(extents.max() * UNITS[name] / known / machine.work.diameter)))
+        wide = {name: extents.max() * metres / known / machine.work.diameter for name, metres in UNITS.items()}
+        unit = min(wide, key=lambda name: (wide[name] > 1.0, abs(np.log(wide[name]))))  # those first that fit
         key = "scale" if unit == job.part.unit else "unit"
         remedy = None if unit == job.part.unit else f'unit = "{unit}"?'
     if not len(points) and key == "scale":
