@@ -75,10 +75,10 @@ def test_every_command_can_be_quiet_and_tell_scripts(words, command):
 
 
 def test_progress_tells_stage_and_rate(monkeypatch, capfd):
-    """On a terminal; elsewhere nothing is said."""
+    """On a terminal; elsewhere nothing is said of what is done at once."""
     from rich.progress import Progress
 
-    from pentapod.cli.output import progress_bar
+    from pentapod.cli.progress import progress_bar
 
     with progress_bar(quiet=False) as progress:
         progress("tracing", 0.5, "half")
@@ -95,3 +95,19 @@ def test_progress_tells_stage_and_rate(monkeypatch, capfd):
     assert shown["verify"]["note"] == "rows"
     assert shown["verify"]["rate"].endswith(" %/s")
     assert float(shown["verify"]["rate"].split()[0]) > 0.0
+
+
+def test_progress_in_a_file_is_a_line_every_few_seconds():
+    from pentapod.cli.progress import LINE_EVERY_S, Lines
+
+    now, lines = [0.0], []
+    told = Lines(lines.append, lambda: now[0])
+    told("toolpath", 0.0)
+    now[0] = LINE_EVERY_S
+    told("toolpath", 0.0)
+    told("toolpath", 0.1)
+    now[0] += 1.0
+    told("verify", 0.0, "reading")
+    now[0] += LINE_EVERY_S
+    told("verify", 0.25, "between the rows")
+    assert lines == ["toolpath, 5 s so far", "verify 25 %, about 15 s left: between the rows"]

@@ -1,13 +1,10 @@
-"""Options, progress bar on stderr, JSON on stdout, and the text of a verdict, shared by the commands."""
+"""Options, JSON on stdout, and the text of a verdict, shared by the commands."""
 
 from __future__ import annotations
 
 import json
-import logging
 import math
-import sys
-from collections.abc import Callable, Generator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -15,7 +12,6 @@ import click
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from pentapod.base.progress import Progress
     from pentapod.base.refusal import Advice
     from pentapod.verify.verdict.verdict import Certificate, NotJudged, Verdict
 
@@ -45,55 +41,6 @@ def _finite(value: Any) -> Any:
     if isinstance(value, float) and (not math.isfinite(value)):
         return None
     return value
-
-
-@contextmanager
-def progress_bar(*, quiet: bool) -> Generator[Progress]:
-    """Yield a Progress that draws a bar for each stage on stderr; silent where that is no terminal.
-
-    Messages of the log `pentapod` (kernels are compiled) are printed above the bars.
-    """
-    from pentapod.base.progress import silent
-    from pentapod.cli.signals import raising_again
-
-    if quiet or not sys.stderr.isatty():
-        yield raising_again(silent)
-        return
-    from rich.console import Console
-    from rich.logging import RichHandler
-    from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bars
-
-    tasks: dict[str, TaskID] = {}
-    columns = (
-        TextColumn("{task.description:<10}"),
-        BarColumn(),
-        TextColumn("{task.fields[rate]:>9}"),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(compact=True),
-        TextColumn("{task.fields[note]}"),
-    )
-    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
-
-        def show(stage: str, fraction: float, note: str = "") -> None:
-            if stage not in tasks:
-                # Without a total the bar pulses.
-                tasks[stage] = bars.add_task(stage, total=None, note=note, rate="")
-            speed = bars.tasks[tasks[stage]].speed
-            rate = f"{100.0 * speed:.3g} %/s" if speed and fraction < 1.0 else ""
-            total = 1.0 if fraction > 0.0 else None
-            bars.update(tasks[stage], total=total, completed=fraction, note=note, rate=rate)
-
-        log = logging.getLogger("pentapod")
-        level = log.level
-        handler = RichHandler(console=bars.console, show_time=False, show_level=False, show_path=False)
-        log.addHandler(handler)
-        log.setLevel(logging.INFO)
-        try:
-            yield raising_again(show)
-        finally:
-            log.removeHandler(handler)
-            log.setLevel(level)
 
 
 def note_changes(folder: Path) -> None:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pentapod.cli.output import advice_text, echo_json, json_option, progress_bar, quiet_option, verdict_text
+from pentapod.cli.output import advice_text, echo_json, json_option, quiet_option, verdict_text
+from pentapod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from pentapod.job.advice.options import AdviceOptions

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pentapod.cli.output import echo_json, json_option, note_changes, progress_bar, quiet_option
+from pentapod.cli.output import echo_json, json_option, note_changes, quiet_option
+from pentapod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from pentapod.machine import Machine

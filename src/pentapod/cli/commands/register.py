@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pentapod.cli.numbers import Real, Whole
-from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
+from pentapod.cli.output import echo_json, json_option, quiet_option
+from pentapod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from pentapod.job.clamped.registration import FoundPart

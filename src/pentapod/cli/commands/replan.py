@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 
 from pentapod.cli.commands.plan import shown
-from pentapod.cli.output import json_option, progress_bar, quiet_option
+from pentapod.cli.output import json_option, quiet_option
+from pentapod.cli.progress import progress_bar
 
 
 @click.command()

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from pentapod.cli.output import echo_json, json_option, note_changes, progress_bar, quiet_option, verdict_text
+from pentapod.cli.output import echo_json, json_option, note_changes, quiet_option, verdict_text
+from pentapod.cli.progress import progress_bar
 
 
 @click.command()

@@ -7,7 +7,8 @@ import time
 import click
 
 from pentapod.cli.numbers import Whole
-from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
+from pentapod.cli.output import echo_json, json_option, quiet_option
+from pentapod.cli.progress import progress_bar
 
 
 @click.command("warm-up")

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from pentapod.cli.output import echo_json, json_option, progress_bar, quiet_option
+from pentapod.cli.output import echo_json, json_option, quiet_option
+from pentapod.cli.progress import progress_bar
 
 
 @click.command()

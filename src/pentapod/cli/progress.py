@@ -1,0 +1,103 @@
+"""Progress on stderr: stage, share and time left, as bars on a terminal, as lines where stderr is a file or a pipe."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from pentapod.base.progress import Progress
+
+LINE_EVERY_S = 5.0
+"""Seconds between two lines; what takes less than that prints none."""
+
+FIRST_SHARE = 0.02
+"""Share of a stage from which the time that is left is told."""
+
+
+@contextmanager
+def progress_bar(*, quiet: bool) -> Generator[Progress]:
+    """Yield a Progress that draws a bar for each stage on a terminal, and prints lines elsewhere; silent if quiet.
+
+    Messages of the log `pentapod` (kernels are compiled) are printed above the bars.
+    """
+    from pentapod.base.progress import silent
+    from pentapod.cli.signals import raising_again
+
+    if quiet:
+        yield raising_again(silent)
+    elif not sys.stderr.isatty():
+        yield raising_again(Lines(lambda line: click.echo(line, err=True)))
+    else:
+        with _bars() as show:
+            yield raising_again(show)
+
+
+class Lines:
+    """A Progress that prints a line every few seconds: stage, share, time left, note."""
+
+    def __init__(self, echo: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
+        self.echo, self.clock = echo, clock
+        self.stage, self.began, self.told = "", clock(), clock()
+
+    def __call__(self, stage: str, fraction: float, note: str = "") -> None:
+        """Print a line if it is time."""
+        now = self.clock()
+        if stage != self.stage:
+            self.stage, self.began = stage, now
+        if now - self.told < LINE_EVERY_S:
+            return
+        self.told, seconds = now, now - self.began
+        share = f" {100.0 * fraction:.0f} %" if fraction > 0.0 else f", {seconds:.0f} s so far"
+        left = seconds * (1.0 - fraction) / fraction if fraction >= FIRST_SHARE else None
+        more = "" if left is None or seconds == 0.0 else f", about {left:.0f} s left"
+        self.echo(f"{stage}{share}{more}{f': {note}' if note else ''}")
+
+
+@contextmanager
+def _bars() -> Generator[Progress]:
+    """Yield a Progress that draws a bar for each stage; the clock of a stage stands still once the next one begins."""
+    from rich.console import Console
+    from rich.logging import RichHandler
+    from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bars
+
+    tasks: dict[str, TaskID] = {}
+    columns = (
+        TextColumn("{task.description:<10}"),
+        BarColumn(),
+        TextColumn("{task.fields[share]:>5}"),
+        TextColumn("{task.fields[rate]:>9}"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(compact=True),
+        TextColumn("{task.fields[note]}"),
+    )
+    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
+
+        def show(stage: str, fraction: float, note: str = "") -> None:
+            if stage not in tasks:
+                for other in tasks.values():
+                    bars.stop_task(other)
+                # Without a total the bar pulses.
+                tasks[stage] = bars.add_task(stage, total=None, note=note, rate="", share="")
+            speed = bars.tasks[tasks[stage]].speed
+            rate = f"{100.0 * speed:.3g} %/s" if speed and fraction < 1.0 else ""
+            total, share = (1.0, f"{100.0 * fraction:.0f} %") if fraction > 0.0 else (None, "")
+            bars.update(tasks[stage], total=total, completed=fraction, note=note, rate=rate, share=share)
+
+        log = logging.getLogger("pentapod")
+        level = log.level
+        handler = RichHandler(console=bars.console, show_time=False, show_level=False, show_path=False)
+        log.addHandler(handler)
+        log.setLevel(logging.INFO)
+        try:
+            yield show
+        finally:
+            log.removeHandler(handler)
+            log.setLevel(level)
