@@ -101,7 +101,7 @@ class ProgramError(InputError):
 def _shown(value: object) -> str:
     """Return a value for a message, shortened."""
     try:
-        text = repr(value)
+        text = f"{value:.12g}" if isinstance(value, float) else repr(value)
     except (ValueError, RecursionError):  # a whole number beyond 4,300 digits, or lists in lists in lists
         return f"{type(value).__name__} too large to show"
     return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 1] + "…"

@@ -26,7 +26,8 @@ VERBS = {
     "design": "pentapod.cli.studies.design:design",
     "modes": "pentapod.cli.commands.modes:modes",
     "new": "pentapod.cli.commands.new:new",
-    "warm-up": "pentapod.cli.commands.warm_up:warm_up",
+    "warm-up": "pentapod.cli.install.warm_up:warm_up",
+    "doctor": "pentapod.cli.install.doctor:doctor",
 }
 """In the order of `pentapod --help`: name → module:command."""
 

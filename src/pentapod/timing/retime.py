@@ -27,6 +27,9 @@ from pentapod.timing.time_law.trajectory import Profile, Trajectory
 from pentapod.timing.topp.engine import Engine
 from pentapod.timing.topp.stages import Failure
 
+MOST_ROWS = 2e8
+"""Rows of a program for which memory has room."""
+
 
 @stage
 def retime(
@@ -83,6 +86,7 @@ def retime(
     indices = [k for k, piece in enumerate(path.pieces) if piece.length > STILL_M]
     dwells = dwells_of(path, indices, period)
     _check_standing(start_speed, end_speed, dwells)
+    _check_rows(path, dwells, period)
     total = sum(path.pieces[k].length for k in indices)
     profiles: list[PieceProfile] = []
     slacks, done = (0.5 * velocity_margin, 0.7 * acceleration_margin), 0.0
@@ -119,6 +123,15 @@ def _check_options(margins: dict[str, float], speeds: dict[str, float]) -> None:
     for name, speed in speeds.items():
         if not 0.0 <= speed < np.inf:
             raise InputError("must be a speed", key=name, value=speed, expected="m/s, 0 or more")
+
+
+def _check_rows(path: LegPathLike, dwells: Floats, period: float) -> None:
+    """Raise InputError where the feeds alone make a program of more rows than memory has room for."""
+    steps = (np.diff(piece.section_ends, prepend=0.0) / piece.section_feeds for piece in path.pieces)
+    rows = (sum(float(step.sum()) for step in steps) + float(dwells.sum())) / period
+    if rows > MOST_ROWS:
+        what = f"the program would have {rows:.3g} rows of {period:g} s"
+        raise InputError(what, key="feed", expected=f"at most {MOST_ROWS:.0e} rows", remedy="a faster feed")
 
 
 def _check_standing(start: float, end: float, dwells: Floats) -> None:

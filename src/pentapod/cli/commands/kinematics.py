@@ -38,7 +38,8 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -
 
     The axis points from the tip to the spindle, as in APT; it need not have unit length. Without numbers, CSV
     is read from stdin: a header "x_mm,y_mm,z_mm,i,j,k", then a pose in each line. Of a machine with a leg model
-    the commands of the drives follow, for poses that are visited in this order.
+    the commands of the drives follow, for poses that are visited in this order. Exit code 1 where a leg is
+    beyond its stroke (`within_strokes`).
     """
     import numpy as np
 
@@ -62,7 +63,7 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -
         columns |= {f"command{k + 1}_mm": told[:, k] * 1e3 for k in range(told.shape[1])}
     columns |= {"component": components, "within_strokes": within.tolist()}
     _print(columns, as_json=as_json, one=bool(pose), quiet=quiet)
-    return 0
+    return 0 if within.all() else 1
 
 
 @click.command(context_settings=_NEGATIVES)

@@ -31,6 +31,29 @@ def list_machines(as_json: bool, quiet: bool) -> int:
     return 0
 
 
+@machine.command("new")
+@click.argument("file", type=click.Path(path_type=Path), metavar="FILE.toml")
+@click.option("--like", default="desk", show_default=True, help="Shipped machine, or a machine file: all values.")
+@json_option
+@quiet_option
+def new_machine(file: Path, like: str, as_json: bool, quiet: bool) -> int:
+    """Write a machine file with a remark on each key, to fill in the numbers of your machine."""
+    from pentapod.base.errors import InputError
+    from pentapod.base.files import atomic_write
+    from pentapod.machine.report.commented import commented_machine
+
+    if file.exists():
+        raise InputError("the file is there already", file=file, remedy="choose another name, or remove it")
+    text = commented_machine(like, file.stem)
+    with atomic_write(file) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    if as_json:
+        echo_json({"machine": str(file), "like": like})
+    elif not quiet:
+        click.echo(f"{file}: the values are those of {like}; `pentapod machine check {file}` judges them")
+    return 0
+
+
 @machine.command()
 @click.argument("name_or_file")
 @json_option

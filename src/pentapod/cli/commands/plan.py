@@ -18,9 +18,12 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("job", type=click.Path(path_type=Path))
+@click.argument("jobs", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="JOB...")
 @click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("out"), show_default=True,
-              help="Folder for the files.")  # fmt: skip
+              help="Folder for the files; with several jobs for a folder of each.")  # fmt: skip
+@click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE",
+              help="Another value of a key: --set feed.cut_mm_min=1200; writes changed-job.toml, too. "
+                   "Can be repeated.")  # fmt: skip
 @click.option("--explain", is_flag=True, help="Print the nearest limits: where, and by how much.")
 @click.option("--advice", type=click.IntRange(0), metavar="N",
               help="Changes to find with which a job that cannot be done is planned; 0: do not search. "
@@ -30,7 +33,14 @@ if TYPE_CHECKING:
 @json_option
 @quiet_option
 def plan(
-    job: Path, out: Path, explain: bool, advice: int | None, placement: Path | None, as_json: bool, quiet: bool
+    jobs: tuple[Path, ...],
+    out: Path,
+    changes: tuple[str, ...],
+    explain: bool,
+    advice: int | None,
+    placement: Path | None,
+    as_json: bool,
+    quiet: bool,
 ) -> int:
     """Plan JOB.toml: write program.csv, verdict.json, report.html and plan.npz.
 
@@ -39,51 +49,112 @@ def plan(
     cannot be done are searched for and planned, and those whose verdict passed are printed. A job in several set-ups
     has a folder of files for each: setup-1, setup-2, and so on.
 
+    Several jobs are planned one after the other, each into a folder of its name in OUT; what one of them cannot does
+    not stop the others, and the exit code is the largest one. `pentapod batch` uses all cores, and goes on after an
+    interruption.
+
     Ctrl-C during the search for a placement continues with the best one so far, if that fits. During the
     search for changes it ends that. At any other time it ends the command and changes nothing.
     """
+    asked = Asked(out, changes, explain, advice, placement, as_json, quiet)
+    if len(jobs) == 1:
+        code, content = _planned(jobs[0], asked)
+    else:
+        code, content = _each(jobs, asked)
+    if as_json and content is not None:
+        echo_json(content)
+    return code
+
+
+@dataclasses.dataclass(frozen=True)
+class Asked:
+    """The options of a command."""
+
+    out: Path
+    changes: tuple[str, ...]
+    explain: bool
+    advice: int | None
+    placement: Path | None
+    as_json: bool
+    quiet: bool
+
+
+def _each(jobs: tuple[Path, ...], asked: Asked) -> tuple[int, Any]:
+    """Plan jobs one after the other; return the largest exit code and what JSON says of each."""
     from pentapod.base.errors import InputError
+
+    if asked.placement is not None:
+        raise InputError("a placement is of one job", key="--placement", value=f"{len(jobs)} jobs", expected="one job")
+    names = [path.stem for path in jobs]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise InputError("two jobs of one name", value=twice[0], expected="names that differ, for their folders")
+    codes: list[int] = []
+    contents: list[Any] = []
+    for path in jobs:
+        if not (asked.as_json or asked.quiet):
+            click.echo(f"== {path}")
+        try:
+            code, content = _planned(path, dataclasses.replace(asked, out=asked.out / path.stem))
+        except InputError as error:
+            from pentapod.cli.main import EXIT_INPUT
+
+            click.echo(f"error: {error}", err=True)
+            code, content = EXIT_INPUT, {"error": str(error)}
+        codes.append(code)
+        contents.append({"job": str(path), "exit_code": code, **(content or {})})
+    if not (asked.as_json or asked.quiet):
+        passed = codes.count(0)
+        click.echo(f"{len(jobs)} jobs: {passed} passed, {len(jobs) - passed} did not")
+    return max(codes), contents
+
+
+def _planned(path: Path, asked: Asked) -> tuple[int, dict[str, Any] | None]:
+    """Plan one job and print what became of it; return the exit code, and what JSON says."""
+    from pentapod.base.errors import InputError
+    from pentapod.cli.changes import changed
     from pentapod.job.schema.job import Job
 
-    loaded = Job.load(job)
+    job = changed(Job.load(path), asked.changes, asked.out)
 
     from pentapod.job.advice.options import AdviceOptions
     from pentapod.job.advice_on_errors import can_help
     from pentapod.job.artefacts import REPORT
     from pentapod.job.pipeline import run
 
-    options = None if advice == 0 else AdviceOptions(wanted=advice or 1)
-    if placement is not None:
+    options = None if asked.advice == 0 else AdviceOptions(wanted=asked.advice or 1)
+    if asked.placement is not None:
         from pentapod.job.clamped.placed_job import placed_job, read_placement
 
-        loaded = placed_job(loaded, read_placement(placement), out)
+        job = placed_job(job, read_placement(asked.placement), asked.out)
     try:
-        with progress_bar(quiet=quiet or as_json) as progress:
-            outcome = run(loaded, out, progress, writers={REPORT: _write_report}, advice=options)
+        with progress_bar(quiet=asked.quiet or asked.as_json) as progress:
+            outcome = run(job, asked.out, progress, writers={REPORT: _write_report}, advice=options)
     except InputError as error:
-        if options is None or not can_help(error) or (advice is None and error.key == "part.unit"):
+        if options is None or not can_help(error) or (asked.advice is None and error.key == "part.unit"):
             raise
         click.echo(f"error: {error}", err=True)  # at once: the search takes as long as a plan or two
-        return _advised(loaded, options, as_json=as_json, quiet=quiet)
-    return shown(outcome, out, explain=explain, as_json=as_json, quiet=quiet)
+        return _advised(job, options, as_json=asked.as_json, quiet=asked.quiet)
+    return shown(outcome, asked.out, explain=asked.explain, as_json=asked.as_json, quiet=asked.quiet)
 
 
-def shown(outcome: Outcome, out: Path, *, explain: bool, as_json: bool, quiet: bool) -> int:
-    """Print the outcome of a run in a folder and return the exit code."""
+def shown(
+    outcome: Outcome, out: Path, *, explain: bool, as_json: bool, quiet: bool
+) -> tuple[int, dict[str, Any] | None]:
+    """Print the outcome of a run in a folder, as text; return the exit code, and what JSON says."""
     from pentapod.job.artefacts import PROGRAM, REPORT
     from pentapod.job.outcome import SetUps
     from pentapod.planning import PlacedPath
     from pentapod.planning.diagnosis import active_limits
     from pentapod.timing import Explanation
 
-    refusal = outcome.refusal
+    refusal, content = outcome.refusal, None
     if as_json:
         seconds = {stage.name: round(stage.seconds, 3) for stage in outcome.stages}
         story = outcome.find(Explanation)
         more: dict[str, Any] = {} if story is None else {"timing": story.to_dict()}
         if explain and (placed := outcome.find(PlacedPath)) is not None:
             more["limits"] = [dataclasses.asdict(limit) for limit in active_limits(placed)]
-        echo_json({**outcome.to_dict(), **more, "out": str(out), "seconds": seconds})
+        content = {**outcome.to_dict(), **more, "out": str(out), "seconds": seconds}
     elif not quiet:
         click.echo("\n".join(stage.remark for stage in outcome.stages if stage.remark))
         if explain:
@@ -99,7 +170,7 @@ def shown(outcome: Outcome, out: Path, *, explain: bool, as_json: bool, quiet: b
         click.echo(advice_text(refusal.advice), err=True, nl=bool(refusal.advice))
     elif not outcome.passed and quiet:
         click.echo("the verdict failed", err=True)
-    return 0 if outcome.passed else 1
+    return (0 if outcome.passed else 1), content
 
 
 def _write_report(outcome: Outcome, file: Path) -> None:
@@ -108,8 +179,8 @@ def _write_report(outcome: Outcome, file: Path) -> None:
     write_report(outcome, file)
 
 
-def _advised(job: Job, options: AdviceOptions, *, as_json: bool, quiet: bool) -> int:
-    """Search for advice for a job that is an error, print it, and return the exit code of the error."""
+def _advised(job: Job, options: AdviceOptions, *, as_json: bool, quiet: bool) -> tuple[int, dict[str, Any] | None]:
+    """Search for advice for a job that is an error, print it; return the error's exit code, and what JSON says."""
     from pentapod.base.errors import InputError
     from pentapod.cli.main import EXIT_INPUT
     from pentapod.job.advice_on_errors import advise
@@ -118,12 +189,10 @@ def _advised(job: Job, options: AdviceOptions, *, as_json: bool, quiet: bool) ->
         with progress_bar(quiet=quiet or as_json) as progress:
             found = advise(job, options=options, progress=progress)
     except InputError:  # the one that was printed: nothing can be tried before it is mended
-        return EXIT_INPUT
-    if as_json:
-        echo_json({"advice": [each.to_dict() for each in found.advice], "tried": found.tried})
+        return EXIT_INPUT, None
     click.echo(f"{found.sentence}.", err=True)
     click.echo(advice_text(found.advice), err=True, nl=bool(found.advice))
-    return EXIT_INPUT
+    return EXIT_INPUT, {"advice": [each.to_dict() for each in found.advice], "tried": found.tried}
 
 
 def _explained(outcome: Outcome) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from pentapod.cli.commands.plan import shown
-from pentapod.cli.output import json_option, quiet_option
+from pentapod.cli.output import echo_json, json_option, quiet_option
 from pentapod.cli.progress import progress_bar
 
 
@@ -34,4 +34,7 @@ def replan(folder: Path, placement: Path, out: Path | None, explain: bool, as_js
     target = folder / FOLDER if out is None else out
     with progress_bar(quiet=quiet or as_json) as progress:
         outcome = planned_again(folder, placement, target, progress, writers={REPORT: write_report})
-    return shown(outcome, target, explain=explain, as_json=as_json, quiet=quiet)
+    code, content = shown(outcome, target, explain=explain, as_json=as_json, quiet=quiet)
+    if content is not None:
+        echo_json(content)
+    return code

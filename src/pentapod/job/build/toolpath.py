@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from pentapod.base.errors import ToolpathError
+from pentapod.base.errors import MeshError, ToolpathError
 from pentapod.base.keys import fields_from
 from pentapod.base.progress import Progress, silent
 from pentapod.base.units import from_si
@@ -19,6 +19,7 @@ from pentapod.geometry.directions import normalised
 from pentapod.geometry.solids import Cone
 from pentapod.job.build.region import covers_region, job_region, region_report
 from pentapod.job.build.tool import job_tool
+from pentapod.job.build.words import in_words_of
 from pentapod.job.schema.job import Job
 from pentapod.job.schema.strategies import FILE
 from pentapod.machine.machine import Machine
@@ -142,7 +143,10 @@ def job_toolpath(
         asked = job_options(job)
         if covers_region(job):
             region.append(region_report(job, mesh))
-        toolpath, report = toolpath_with_report(mesh, tool, asked)
+        try:
+            toolpath, report = toolpath_with_report(mesh, tool, asked)
+        except (MeshError, ToolpathError) as error:
+            raise in_words_of(job, error) from error
         toolpath = stepped(oriented(toolpath, tool, _orientation(job, tool)), job.toolpath.si.axis_step)
     options = gouge_options(job, _remedies(job), None if from_file else job_link_style(job, mesh, toolpath))
     toolpath, gouges = without_gouges(toolpath, tool, mesh, options, progress)

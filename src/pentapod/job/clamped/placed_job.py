@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, cast
@@ -10,13 +9,13 @@ from typing import Any, cast
 from pydantic import ValidationError
 
 from pentapod.base.errors import InputError
-from pentapod.base.files import atomic_write
 from pentapod.base.tables import problem_of
-from pentapod.base.toml import line_of, parsed, read_toml, toml_text
+from pentapod.base.toml import line_of, parsed, read_toml
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.build.placement import fixed_placement, job_at
 from pentapod.job.schema.job import Job
 from pentapod.job.schema.placement import PlacementTable
+from pentapod.job.schema.written_job import write_job
 
 PLACED_JOB = "placed-job.toml"
 """Name of the job file of a run with a placement of its own, in the run's folder."""
@@ -58,21 +57,7 @@ def placed_job(job: Job, placement: RigidTransform, folder: Path) -> Job:
     fixed = job_at(job, placement)
     content = fixed.tables.model_dump(mode="json", exclude_unset=True)
     content["placement"] = fixed.placement.model_dump(mode="json", exclude_defaults=True)
-    folder.mkdir(parents=True, exist_ok=True)
-    for table, key, path in job.named_files:
-        content[table][key] = _relative(path, folder)
-    file = folder / PLACED_JOB
-    with atomic_write(file) as temporary:
-        head = f"# {job.path.name}, with the part where it was found\n\n"
-        temporary.write_text(head + toml_text(content), encoding="utf-8")
-    return Job.load(file)
-
-
-def _relative(path: Path, folder: Path) -> str:
-    try:
-        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
-    except ValueError:  # on another drive
-        return path.resolve().as_posix()
+    return write_job(job, content, folder / PLACED_JOB, "with the part where it was found")
 
 
 def _tuples(value: Any) -> Any:

@@ -128,7 +128,9 @@ def _parameter_over_length(curve: PPoly, tilt_centre: float) -> PPoly:
         lengths = np.insert(lengths, coarse + 1, late)
         first = coarse + np.arange(len(coarse))
         unknown = np.sort(np.concatenate([first, first + 1]))
-    raise ToolpathError("the path bends too sharply to measure its length", value=float(error.max()))
+    raise ToolpathError(
+        "the path bends too sharply to measure its length", key="path_tolerance", remedy="a larger tolerance.path_mm"
+    )
 
 
 def _inverse(curve: PPoly, u: Floats, tilt_centre: float) -> Floats:
