@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from collections.abc import Generator
@@ -75,9 +76,10 @@ def _end_by(number: int) -> NoReturn:
 
 
 def _is_loading(frame: FrameType | None) -> bool:
-    """Whether the import system is among the callers."""
+    """Whether the import system is among the callers, or pydantic, which makes errors of its own of an interrupt."""
     while frame is not None:
-        if frame.f_code.co_filename.startswith("<frozen importlib"):
+        file = frame.f_code.co_filename
+        if file.startswith("<frozen importlib") or f"{os.sep}pydantic{os.sep}" in file:
             return True
         frame = frame.f_back
     return False

@@ -1,0 +1,60 @@
+"""pentapod plan with other values of keys, and of several jobs; errors in the words of the job file."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from pentapod.cli.main import run
+from pentapod.job import Job
+
+
+def test_other_values_are_planned_and_their_job_is_kept(make_job, tmp_path, capsys):
+    job, out = make_job(), tmp_path / "out"
+    changes = ["--set", "feed.cut_mm_min=1800", "--set", "placement.component = ++"]
+    assert run(["plan", str(job), "-o", str(out), *changes, "-q"]) == 0
+    changed = Job.load(out / "changed-job.toml")
+    assert changed.feed.cut_mm_min == 1800.0
+    assert changed.mesh_path.samefile(Job.load(job).mesh_path)
+    assert run(["verify", str(out / "program.csv"), "--job", str(out / "changed-job.toml"), "-q"]) == 0
+    assert run(["verify", str(out / "program.csv"), "--job", str(job)]) == 1
+    assert "FAIL  job" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("feed", "--set: not a change of a key (got 'feed'); expected TABLE.KEY=VALUE"),
+        ("feed.cut_mm_mn=3", 'feed.cut_mm_mn: unknown key; did you mean "cut_mm_min"?'),
+        ("machine.legs.max_length_mm=3", "--set: not a change of a key"),
+        ("feed.cut_mm_min=fast", "feed.cut_mm_min: wrong value (got 'fast'); expected number"),
+        ("toolpath.stepover_mm=1e-7", "toolpath.stepover_mm: the passes are too dense for this mesh (got 1e-07)"),
+        ("feed.cut_mm_min=1e-6", "feed: the program would have"),
+    ],
+)
+def test_wrong_values_are_one_error_about_the_key(make_job, tmp_path, capsys, change, said):
+    assert run(["plan", str(make_job()), "-o", str(tmp_path / "out"), "-q", "--advice", "0", "--set", change]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert len(error.splitlines()) == 1
+    assert not (tmp_path / "out" / "program.csv").exists()
+
+
+def test_several_jobs_are_planned_one_after_the_other(make_job, tmp_path, capsys):
+    first, out = make_job(name="first.toml"), tmp_path / "out"
+    broken = make_job(("cut_mm_min", "cut"), name="broken.toml")
+    assert run(["plan", str(broken), str(first), "-o", str(out), "--json"]) == 2
+    said = capsys.readouterr()
+    told = json.loads(said.out)
+    assert [each["exit_code"] for each in told] == [2, 0]
+    assert told[0]["error"] in said.err
+    assert told[1]["passed"]
+    assert (out / "first" / "program.csv").exists()
+    assert not (out / "broken").exists()
+
+
+def test_two_jobs_of_one_name_are_an_error(make_job, tmp_path, capsys):
+    job = str(make_job())
+    assert run(["plan", job, job, "-o", str(tmp_path / "out")]) == 2
+    assert "two jobs of one name (got 'job')" in capsys.readouterr().err
