@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -88,18 +89,43 @@ def reserve_of(need: Need, options: ProofOptions = OPTIONS) -> float:
 
 
 def worst_poses(sample: Sample, vector: Floats, options: ProofOptions = OPTIONS) -> Floats:
-    """Return unit poses (K, 5) of a dense sample in which a design is worse than on the sample, by a proof's step."""
-    design, unit = sample.unknowns.design(vector), dense_poses(options)
+    """Return unit poses (K, 5) in which a design is worse than on the sample: worst of a dense sample, made worse.
+
+    What a need has as reserve is used up by the step of a proof, and by how much worse a pose may be before it counts.
+    """
+    design = sample.unknowns.design(vector)
     axes = design.base_axes()
+
+    def figures(unit: Floats) -> dict[str, Floats]:
+        found = in_poses(design, axes, *design.poses(unit))
+        return {name: SHAPE.get(name, (1.0,))[0] * values for name, values in found.items() if name != "top"}
+
     with np.errstate(all="ignore"):
-        here, dense = (in_poses(design, axes, *design.poses(poses)) for poses in (sample.unit, unit))
+        here, unit = figures(sample.unit), dense_poses(options)
+        dense = {name: values for name, values in figures(unit).items() if np.isfinite(values).all()}
+        poses = unit[[int(np.argmax(values)) for values in dense.values()]]
+        poses, worst = _climbed(figures, list(dense), poses, options)
     rows: list[int] = []
-    for name, values in dense.items():
-        sense, kind = SHAPE.get(name, (1.0, "force"))
-        if name == "top" or not np.isfinite(values).all():
-            continue
-        step = getattr(options, kind) * (float(np.max(values)) if name in FORCES else 1.0)
-        worst = int(np.argmax(sense * values))
-        if sense * values[worst] > (sense * here[name]).max() + 0.5 * options.reserve * step:
-            rows.append(worst)
-    return unit[sorted(set(rows))]
+    for row, name in enumerate(dense):
+        step = getattr(options, SHAPE.get(name, (1.0, "force"))[1]) * (worst[row] if name in FORCES else 1.0)
+        if worst[row] > here[name].max() + (options.reserve - 1.0) * step:
+            rows.append(row)
+    return poses[rows]
+
+
+def _climbed(
+    figures: Callable[[Floats], dict[str, Floats]], names: list[str], poses: Floats, options: ProofOptions
+) -> tuple[Floats, Floats]:
+    """Return unit poses (K, 5) near those given, one for each name, where its figure is greater; and the figures."""
+    step = np.array([0.25, np.pi / options.around, 1.0 / max(options.levels - 1, 1), 0.25, np.pi / options.azimuths])
+    moves = np.stack([axis.ravel() for axis in np.meshgrid(*[(0.0, -1.0, 1.0)] * 5, indexing="ij")], axis=-1)
+    worst = np.zeros(len(names))
+    for _ in range(options.climbs if names else 0):
+        near = poses[:, None] + step * moves
+        near = np.clip(near, (0.0, -np.inf, -1.0, 0.0, -np.inf), (1.0, np.inf, 1.0, 1.0, np.inf))
+        found = figures(near.reshape(-1, 5))
+        values = np.stack([found[name].reshape(len(names), -1)[row] for row, name in enumerate(names)])
+        best, rows = np.nan_to_num(values, nan=-np.inf).argmax(axis=1), np.arange(len(names))
+        poses, worst = near[rows, best], values[rows, best]
+        step = 0.5 * step
+    return poses, worst

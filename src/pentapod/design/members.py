@@ -4,36 +4,52 @@ from __future__ import annotations
 
 import hashlib
 import json
-from concurrent.futures import Executor
+import tomllib
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.base.display import load_extra
 from pentapod.base.errors import InputError
 from pentapod.base.files import atomic_write
 from pentapod.base.progress import Progress, silent
 from pentapod.base.values import Value
 from pentapod.base.version import __version__
+from pentapod.batch.jobs import job_task
+from pentapod.batch.tasks.engine import Engine
+from pentapod.batch.tasks.task import Row, Task
 from pentapod.design.design_file import DesignFile, Need
 from pentapod.design.evaluation import Sample
 from pentapod.design.figures import in_poses
+from pentapod.design.geometry import Geometry
 from pentapod.design.machine_text import machine_text, outward
-from pentapod.design.part_poses import PartPoses
-from pentapod.design.proof import Proof, prove, worst_of
+from pentapod.design.proof import Proof, worst_of
+from pentapod.design.proof_tasks import proof_of, proof_task
 from pentapod.design.quantities import QUANTITIES, completed
 from pentapod.design.search import Found, search, undominated
-from pentapod.design.unknowns import Unknowns
-from pentapod.job.pipeline import run
+from pentapod.design.workers import worker_processes
 from pentapod.machine.machine import Machine, read_machine
 from pentapod.machine.report.report import check
+from pentapod.numerics.threads import cores
 
 MACHINE = "machine.toml"
 """Name of a member's machine file."""
+TASKS = "tasks"
+"""Folder of the proofs and of the parts' programs."""
 LIMITS = {"shortest_leg": -1, "longest_leg": 1, "base_cone": 1, "platform_least": -1, "platform_most": 1}
 """Figures that limits of a machine's legs and joints are for, with their senses."""
+
+
+@dataclass(frozen=True)
+class Part(Value):
+    """A job that was planned on a member's machine. said: its verdict, or why there is none; folder: of its files."""
+
+    job: str
+    passed: bool
+    said: str
+    folder: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +57,6 @@ class Member(Value):
     """A proven design. proven, dense: its quantities by bounds, and on the dense sample, SI.
 
     machine: its machine file's text. missing: why it is not on the front; empty where it is. boxes: of the proof.
-    parts: by job, whether the verdict of its program passed, and what there is to say.
     """
 
     vector: Floats
@@ -50,7 +65,7 @@ class Member(Value):
     boxes: int
     machine: str
     missing: tuple[str, ...]
-    parts: tuple[tuple[str, bool, str], ...] = ()
+    parts: tuple[Part, ...] = ()
 
     def loaded(self) -> Machine:
         """Return the machine of its file. Raises MachineError."""
@@ -68,24 +83,25 @@ class Front(Value):
     poses: int
 
 
-def design_machines(file: DesignFile, folder: Path, pool: Executor | None = None, progress: Progress = silent) -> Front:
+def design_machines(file: DesignFile, folder: Path, workers: int | None = None, progress: Progress = silent) -> Front:
     """Search, prove, and try the parts; what is done is kept in `folder`, and taken from there when run again.
 
-    Raises InputError: the folder holds another search, or pymoo is not installed.
+    workers: processes, one for each core if None; the result is the same for any number. Proofs and parts are tasks on
+    Dask's workers: in a script of your own, call it below `if __name__ == "__main__":`. Raises InputError: the folder
+    holds another search, or pymoo or Dask is not installed.
     """
+    load_extra("distributed", "design", "proofs and parts need Dask, which is not installed")
     _check_folder(file, folder)
-    found = search(file, folder, pool, progress)
-    proven = _proven(file, found, folder, pool, progress)
-    kept = [member for member in proven if not member.missing]
-    dropped = [member for member in proven if member.missing]
-    tried: list[Member] = []
-    for number, member in enumerate(kept):
-        progress("parts", number / len(kept), f"design {number + 1} of {len(kept)}")
-        done = _with_parts(file, member, folder)
-        (dropped if done.missing else tried).append(done)
+    with worker_processes(workers or cores()) as pool:
+        found = search(file, folder, pool, progress)
+    with Engine(folder / TASKS, workers=workers) as engine:
+        proven = _proven(file, found, engine, progress)
+        kept = _with_parts(file, [member for member in proven if not member.missing], engine, progress)
+    tried = [member for member in kept if not member.missing]
     goals = np.array([[sense * member.proven[name] for name, sense in file.objectives] for member in tried])
     best = undominated(goals.reshape(len(tried), len(file.objectives)))
     members = [member for member, is_best in zip(tried, best, strict=True) if is_best]
+    dropped = [member for member in (*proven, *kept) if member.missing]
     return Front(file, tuple(members), tuple(dropped), found.designs, len(found.sample.unit))
 
 
@@ -104,39 +120,30 @@ def _check_folder(file: DesignFile, folder: Path) -> None:
         temporary.write_text(json.dumps({"digest": digest, "pentapod": __version__}), encoding="utf-8")
 
 
-def _proven(file: DesignFile, found: Found, folder: Path, pool: Executor | None, progress: Progress) -> list[Member]:
+def _proven(file: DesignFile, found: Found, engine: Engine, progress: Progress) -> list[Member]:
     """Return proofs of as many designs as are asked for, spread over what the search found."""
     count = len(found.vectors)
     rows = np.unique(np.linspace(0, count - 1, min(file.search.members, count)).astype(int)) if count else []
-    work = partial(proven_design, file.unknowns, found.sample.parts, folder / "proofs")
     vectors = [found.vectors[row] for row in rows]
-    proofs = map(work, vectors) if pool is None else pool.map(work, vectors)
-    members: list[Member] = []
-    for number, (vector, (proof, parts)) in enumerate(zip(vectors, proofs, strict=True)):
-        progress("proof", (number + 1) / len(vectors), f"{proof.boxes:,} boxes of poses")
-        members.append(_member(file, found.sample, vector, proof, parts))
-    return members
+    designs = [file.unknowns.design(vector) for vector in vectors]
+    proofs = [proof_of(row) for row in _done(engine, [proof_task(design) for design in designs], "proof", progress)]
+    return [_member(file, found.sample, *each) for each in zip(vectors, designs, proofs, strict=True)]
 
 
-def proven_design(unknowns: Unknowns, parts: PartPoses, folder: Path, vector: Floats) -> tuple[Proof, dict[str, float]]:
-    """Return the proof of a design, and its worst figures in the poses of the parts; kept in `folder` by content."""
-    design = unknowns.design(vector)
-    axes = design.base_axes()
-    place = folder / f"{hashlib.sha256(vector.tobytes()).hexdigest()[:16]}.json"
-    in_parts = worst_of(in_poses(design, axes, *parts.at(design))) if len(parts.tips) else {}
-    if place.exists():
-        return Proof(**json.loads(place.read_text(encoding="utf-8"))), in_parts
-    with np.errstate(all="ignore"):
-        proof = prove(design, axes)
-    folder.mkdir(exist_ok=True)
-    with atomic_write(place) as temporary:
-        temporary.write_text(json.dumps(vars(proof)), encoding="utf-8")
-    return proof, in_parts
+def _done(engine: Engine, tasks: list[Task], stage: str, progress: Progress) -> list[Row]:
+    """Return the rows of tasks, in their order."""
+    rows: dict[str, Row] = {}
+    progress(stage, 0.0, f"0 of {len(tasks)} done")
+    for done in engine.run(tasks):
+        rows[done.task.name] = {**done.row, "folder": done.task.name}
+        progress(stage, len(rows) / len(tasks), f"{len(rows)} of {len(tasks)} done")
+    return [rows[task.name] for task in tasks]
 
 
-def _member(file: DesignFile, sample: Sample, vector: Floats, proof: Proof, parts: dict[str, float]) -> Member:
+def _member(file: DesignFile, sample: Sample, vector: Floats, design: Geometry, proof: Proof) -> Member:
     """Return a design with its quantities, machine file, and what it misses."""
-    design = file.unknowns.design(vector)
+    poses = sample.parts
+    parts = worst_of(in_poses(design, design.base_axes(), *poses.at(design))) if len(poses.tips) else {}
     limits = outward({name: _worse(name, value, parts) for name, value in proof.proven.items()})
     proven = completed(design, limits, sample.leg_stiffness)
     known = {name: _worse(name, value, parts) for name, value in proof.found.items()}
@@ -171,24 +178,16 @@ def _missed(need: Need, proven: dict[str, float]) -> str:
     return f"{quantity.key}: proven {got:.5g}, must be {kind} {bound:.5g}"
 
 
-def _with_parts(file: DesignFile, member: Member, folder: Path) -> Member:
-    """Return a member with each job planned on its machine; kept in `folder`."""
-    machine = member.loaded()
-    results: list[tuple[str, bool, str]] = []
-    for job in file.jobs:
-        place = folder / "parts" / f"{machine.digest}-{job.digest}"
-        if (known := place / "outcome.json").exists():
-            name, passed, said = json.loads(known.read_text(encoding="utf-8"))
-            results.append((name, passed, said))
-            continue
-        place.mkdir(parents=True, exist_ok=True)
-        try:
-            outcome = run(job, place, machine=machine, advice=None)
-            said = str(outcome.refusal) if outcome.refusal is not None else outcome.verdict.answer
-            results.append((job.path.name, outcome.passed, said))
-        except InputError as error:
-            results.append((job.path.name, False, str(error)))
-        with atomic_write(known) as temporary:
-            temporary.write_text(json.dumps(results[-1]), encoding="utf-8")
-    missing = tuple(f"{name}: {said}" for name, passed, said in results if not passed)
-    return replace(member, parts=tuple(results), missing=(*member.missing, *missing))
+def _with_parts(file: DesignFile, members: list[Member], engine: Engine, progress: Progress) -> list[Member]:
+    """Return members with each job planned on their machines."""
+    machines = [tomllib.loads(member.machine) for member in members]
+    tasks = [job_task(job, engine.store, machine=machine) for machine in machines for job in file.jobs]
+    rows, count = _done(engine, tasks, "parts", progress) if tasks else [], len(file.jobs)
+    found: list[Member] = []
+    for number, member in enumerate(members):
+        parts = tuple(
+            Part(job.path.name, row["status"] == "passed", str(row["cause"] or "passed"), f"{TASKS}/{row['folder']}")
+            for job, row in zip(file.jobs, rows[number * count : (number + 1) * count], strict=True)
+        )
+        found.append(replace(member, parts=parts, missing=tuple(f"{p.job}: {p.said}" for p in parts if not p.passed)))
+    return found

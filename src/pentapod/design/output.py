@@ -15,6 +15,7 @@ from pentapod.base.files import atomic_write
 from pentapod.base.version import __version__
 from pentapod.design.members import MACHINE, Front, Member
 from pentapod.design.quantities import QUANTITIES, Quantity
+from pentapod.job.artefacts import REPORT
 from pentapod.report.figure import LIMIT_COLOUR, QUIET_COLOUR
 from pentapod.report.placement_views import machine_views
 from pentapod.report.template import write_page
@@ -69,7 +70,10 @@ def _member(member: Member, known: list[Quantity]) -> dict[str, Any]:
         "proven": {q.key: q.shown(member.proven[q.name]) for q in known},
         "worst_known": {q.key: q.shown(member.dense[q.name]) for q in known},
         "boxes": member.boxes,
-        "parts": [{"job": name, "passed": passed, "verdict": said} for name, passed, said in member.parts],
+        "parts": [
+            {"job": part.job, "passed": part.passed, "verdict": part.said, "folder": part.folder}
+            for part in member.parts
+        ],
     }
 
 
@@ -139,7 +143,7 @@ def _shown(front: Front, number_: int, member: Member) -> dict[str, Any]:
         "headline": headline(front, member),
         "proof": f"proven by {member.boxes:,} boxes of poses",
         "views": machine_views(member.loaded()),
-        "parts": [f"{name}: {said}" for name, _, said in member.parts],
+        "parts": [(f"{part.job}: {part.said}", f"{part.folder}/{REPORT}") for part in member.parts],
     }
 
 

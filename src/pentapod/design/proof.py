@@ -24,8 +24,9 @@ class ProofOptions:
     """How close a bound comes to the worst pose that is known, and how long it is tried.
 
     length, angle, clearance, singular: metres and radians; force: share of the value. reserve: so many
-    of these steps the search keeps from a need. around, levels, azimuths: of the
-    dense sample on the rim, and on circles half as large. most: boxes for each of both groups of figures. block: boxes
+    of these steps the search keeps from a need, more than 1: the rest is how much worse than its sample a pose may be.
+    around, levels, azimuths: of the dense sample on the rim, and on circles half as large. climbs: so often its worst
+    poses are made worse, each time by half as far. most: boxes for each of both groups of figures. block: boxes
     at once.
     """
 
@@ -38,6 +39,7 @@ class ProofOptions:
     around: int = 24
     levels: int = 3
     azimuths: int = 36
+    climbs: int = 6
     most: int = 400_000
     block: int = 4096
 

@@ -22,8 +22,8 @@ def design(file: Path, out: Path, workers: int | None, as_json: bool, quiet: boo
     """Search for machines that DESIGN.toml describes: write front.csv, front.json, design.html and machine files.
 
     Every design on the front keeps every need in its whole work volume, proven by bounds over all poses, and makes the
-    parts. Needs the extra `design` (pymoo). Ctrl-C and SIGTERM keep what is done: the same command goes on, and
-    ends with the same files. Exit code 1 where no design holds.
+    parts. Needs the extra `design` (pymoo and Dask). Ctrl-C and SIGTERM keep what is done: the same command goes on,
+    and ends with the same files. Exit code 1 where no design holds.
     """
     from pentapod.design.design_file import DesignFile
 
@@ -31,11 +31,9 @@ def design(file: Path, out: Path, workers: int | None, as_json: bool, quiet: boo
 
     from pentapod.design.members import design_machines
     from pentapod.design.output import TABLE, folder_of, headline, to_dict, write_front
-    from pentapod.design.workers import worker_processes
-    from pentapod.numerics.threads import cores
 
-    with progress_bar(quiet=quiet or as_json) as progress, worker_processes(workers or cores()) as pool:
-        front = design_machines(asked, out, pool, progress)
+    with progress_bar(quiet=quiet or as_json) as progress:
+        front = design_machines(asked, out, workers, progress)
     page = write_front(front, out)
     if as_json:
         echo_json({**to_dict(front), "out": str(out)})
@@ -46,7 +44,7 @@ def design(file: Path, out: Path, workers: int | None, as_json: bool, quiet: boo
         ]
         for number, member in enumerate(front.members, start=1):
             lines.append(f"  {folder_of(number)}: {headline(front, member)}")
-            lines += [f"    {job}: {said}" for job, _, said in member.parts]
+            lines += [f"    {part.job}: {part.said}" for part in member.parts]
         lines += [f"  not kept: {'; '.join(member.missing)}" for member in front.dropped]
         click.echo("\n".join([*lines, f"table: {out / TABLE}", f"page: {page}"]))
     if not front.members:
