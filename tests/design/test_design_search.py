@@ -1,17 +1,29 @@
 """The search: the same bits after an interruption and on any number of processes; its front; its files."""
 
 import json
+import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pentapod.base.errors import InputError
+from designs import geometry_of
+from pentapod.base.errors import InputError, PentapodError
+from pentapod.batch import Engine
+from pentapod.batch.tasks.engine import LOG
 from pentapod.cli.main import run
+from pentapod.design import proof_tasks
 from pentapod.design import search as module
 from pentapod.design.design_file import DesignFile
+from pentapod.design.evaluation import Sample, worst_poses
+from pentapod.design.figures import in_poses
+from pentapod.design.part_poses import PartPoses
+from pentapod.design.proof import FORCES, SHAPE, ProofOptions, prove, worst_of
+from pentapod.design.proof_tasks import proof_of, proof_task, prove_in
 from pentapod.design.search import search, undominated
-from pentapod.design.workers import worker_processes
 from pentapod.machine import Machine, check
+
+LOGS = (LOG, ".lock")
 
 
 def test_undominated_rows():
@@ -42,17 +54,6 @@ def evaluated(*given):
     return real(*given)
 
 
-@pytest.mark.slow
-def test_processes_do_not_change_the_result(design_file, tmp_path):
-    file = DesignFile.load(design_file())
-    (tmp_path / "one").mkdir()
-    (tmp_path / "two").mkdir()
-    search(file, tmp_path / "one")
-    with worker_processes(2) as pool:
-        search(file, tmp_path / "two", pool)
-    assert (tmp_path / "one" / "designs.bin").read_bytes() == (tmp_path / "two" / "designs.bin").read_bytes()
-
-
 def test_evaluations_of_another_version_are_not_taken(design_file, tmp_path):
     """Where a stored design is not the one that is asked for, it is evaluated anew from there on."""
     file = DesignFile.load(design_file())
@@ -72,7 +73,7 @@ def narrow(design_file):
                        ("amplification = 5.3", "amplification = 4.9"))  # fmt: skip
 
 
-def test_command_writes_machines_that_hold(narrow, tmp_path, capsys):
+def test_command_writes_machines_that_hold(narrow, tmp_path, capsys, monkeypatch):
     out = tmp_path / "designs"
     assert run(["design", str(narrow), "-o", str(out), "-j", "1"]) == 0
     said = capsys.readouterr().out
@@ -90,9 +91,60 @@ def test_command_writes_machines_that_hold(narrow, tmp_path, capsys):
         assert front["means"]["amplification"].startswith("bound over all poses")
     page = (out / "design.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 1 + 2 * len(front["members"])
-    before = {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()}
+    proofs = [path.name for path in (out / "tasks").glob("proof-*/row.json")]
+    assert len(proofs) == len(front["members"]) + len(front["dropped"])
+    before = files(out)
+    monkeypatch.setattr(Engine, "submit", None)  # nothing is proven again
     assert run(["design", str(narrow), "-o", str(out), "-j", "1", "-q"]) == 0
-    assert before == {path.name: path.read_bytes() for path in out.iterdir() if path.is_file()}
+    assert before == files(out)
+
+
+def files(folder):
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.name not in LOGS
+            and path.is_file()}  # fmt: skip
+
+
+@pytest.mark.slow
+def test_command_writes_the_same_files_on_two_workers_and_after_a_proof_was_lost(narrow, tmp_path):
+    for workers in ("1", "2"):
+        run(["design", str(narrow), "-o", str(tmp_path / workers), "-j", workers, "-q"])
+    assert files(tmp_path / "1") == files(tmp_path / "2")
+    shutil.rmtree(next((tmp_path / "2" / "tasks").glob("proof-*")))
+    (tmp_path / "2" / "front.json").unlink()
+    run(["design", str(narrow), "-o", str(tmp_path / "2"), "-j", "2", "-q"])
+    assert files(tmp_path / "1") == files(tmp_path / "2")
+
+
+def test_what_a_proof_may_find_beyond_the_sample_is_within_the_reserve(design_file):
+    """Where the dense sample is coarse: its worst poses are made worse until little is left for the proof."""
+    sizes = {"length": 6e-4, "angle": 6e-3, "clearance": 3e-4, "singular": 3e-3, "force": 6e-3}
+    options, file = ProofOptions(around=4, levels=2, azimuths=4, **sizes), DesignFile.load(design_file())
+    start = replace(geometry_of("desk"), diameter=0.02, height=0.01, tilt=np.radians(6.0))
+    unknowns = replace(file.unknowns, start=start)
+    vector = unknowns.vector()
+    sample = Sample(unknowns, None, np.zeros((1, 5)), PartPoses(np.zeros((0, 3)), np.zeros((0, 3))))
+    for _ in range(3):
+        sample = replace(sample, unit=np.concatenate([sample.unit, worst_poses(sample, vector, options)]))
+    design = unknowns.design(vector)
+    axes = design.base_axes()
+    here, proof = worst_of(in_poses(design, axes, *design.poses(sample.unit))), prove(design, axes, options)
+    assert proof.settled
+    for name, (sense, kind) in (SHAPE | dict.fromkeys(FORCES, (1.0, "force"))).items():
+        step = getattr(options, kind) * (here[name] if name in FORCES else 1.0)
+        assert sense * (proof.proven[name] - here[name]) <= options.reserve * step * 1.001, name
+
+
+def test_a_proof_as_a_task_is_the_same_to_the_last_bit(tmp_path, monkeypatch):
+    """Also one that has no bound of a force: the row goes through JSON."""
+    design = replace(geometry_of("desk"), diameter=0.004, height=0.002, tilt=np.radians(2.0))
+    row = prove_in(tmp_path, **json.loads(json.dumps(proof_task(design).arguments)))
+    proof = prove(design, design.base_axes())
+    assert vars(proof_of(json.loads(json.dumps(row)))) == vars(proof)
+    monkeypatch.setattr(proof_tasks, "prove", lambda *_: replace(proof, proven={"amplification": np.inf}))
+    row = prove_in(tmp_path, **proof_task(design).arguments)
+    assert proof_of(json.loads(json.dumps(row, allow_nan=False))).proven == {"amplification": np.inf}
+    with pytest.raises(PentapodError, match="out of memory"):
+        proof_of({"status": "crashed", "cause": "out of memory"})
 
 
 def test_command_says_that_nothing_holds_and_refuses_another_folder(narrow, tmp_path, capsys):

@@ -1,11 +1,9 @@
-"""Evaluation of designs on a sample of poses: a pure function, to be mapped over processes."""
+"""Evaluation of designs on a sample of poses."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -52,11 +50,9 @@ def evaluate(sample: Sample, vector: Floats) -> Floats:
     return np.where(np.isinf(values), FAR, values)
 
 
-def evaluated(sample: Sample, vectors: Floats, pool: Executor | None) -> Floats:
+def evaluated(sample: Sample, vectors: Floats) -> Floats:
     """Return the quantities (N, Q) of designs (N, n)."""
-    work = partial(evaluate, sample)
-    found = map(work, vectors) if pool is None else pool.map(work, vectors, chunksize=max(len(vectors) // 8, 1))
-    return np.array(list(found)).reshape(len(vectors), len(QUANTITIES))
+    return np.array([evaluate(sample, vector) for vector in vectors]).reshape(len(vectors), len(QUANTITIES))
 
 
 def shortfalls(needs: tuple[Need, ...], values: Floats, *, reserve: bool = False) -> Floats:

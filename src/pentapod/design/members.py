@@ -29,10 +29,8 @@ from pentapod.design.proof import Proof, worst_of
 from pentapod.design.proof_tasks import proof_of, proof_task
 from pentapod.design.quantities import QUANTITIES, completed
 from pentapod.design.search import Found, search, undominated
-from pentapod.design.workers import worker_processes
 from pentapod.machine.machine import Machine, read_machine
 from pentapod.machine.report.report import check
-from pentapod.numerics.threads import cores
 
 MACHINE = "machine.toml"
 """Name of a member's machine file."""
@@ -86,14 +84,13 @@ class Front(Value):
 def design_machines(file: DesignFile, folder: Path, workers: int | None = None, progress: Progress = silent) -> Front:
     """Search, prove, and try the parts; what is done is kept in `folder`, and taken from there when run again.
 
-    workers: processes, one for each core if None; the result is the same for any number. Proofs and parts are tasks on
-    Dask's workers: in a script of your own, call it below `if __name__ == "__main__":`. Raises InputError: the folder
-    holds another search, or pymoo or Dask is not installed.
+    The search is one process. Proofs and parts are tasks on Dask's workers: processes, one for each core if `workers`
+    is None; the result is the same for any number. In a script of your own, call it below
+    `if __name__ == "__main__":`. Raises InputError: the folder holds another search, or pymoo or Dask is not installed.
     """
     load_extra("distributed", "design", "proofs and parts need Dask, which is not installed")
     _check_folder(file, folder)
-    with worker_processes(workers or cores()) as pool:
-        found = search(file, folder, pool, progress)
+    found = search(file, folder, progress)
     with Engine(folder / TASKS, workers=workers) as engine:
         proven = _proven(file, found, engine, progress)
         kept = _with_parts(file, [member for member in proven if not member.missing], engine, progress)

@@ -6,9 +6,7 @@ again from the start and takes from it what is there. So it ends with the same b
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +54,7 @@ class Log:
             with path.open("r+b") as file:
                 file.truncate(whole * 8)
 
-    def values(self, sample: Sample, vectors: Floats, pool: Executor | None) -> Floats:
+    def values(self, sample: Sample, vectors: Floats) -> Floats:
         """Return the quantities of designs, from the file as far as it has them."""
         n, start = vectors.shape[1], self.count
         old = self._known[start : start + len(vectors)]
@@ -65,14 +63,14 @@ class Log:
             with self._path.open("r+b") as file:
                 file.truncate(start * self._width * 8)
             self._known, old = self._known[:start], self._known[:0]
-        found = np.concatenate([old[:, n:], evaluated(sample, vectors[len(old) :], pool)])
+        found = np.concatenate([old[:, n:], evaluated(sample, vectors[len(old) :])])
         with self._path.open("ab") as file:
             file.write(np.concatenate([vectors, found], axis=1)[len(old) :].astype("<f8").tobytes())
         self.count += len(vectors)
         return found
 
 
-def search(file: DesignFile, folder: Path, pool: Executor | None = None, progress: Progress = silent) -> Found:
+def search(file: DesignFile, folder: Path, progress: Progress = silent) -> Found:
     """Return the front that is found on the sample. folder: for what has been evaluated.
 
     Raises InputError: pymoo is not installed.
@@ -97,7 +95,7 @@ def search(file: DesignFile, folder: Path, pool: Executor | None = None, progres
     algorithm.setup(problem, termination=("n_gen", asked.generations), seed=asked.seed)
 
     def judged(designs: Any) -> None:
-        values = log.values(sample, designs.get("X"), pool)
+        values = log.values(sample, designs.get("X"))
         goals, missing = _goals(file, values), shortfalls(file.needs, values, reserve=True)
         static = StaticProblem(problem, F=goals, G=missing)
         Evaluator(skip_already_evaluated=False).eval(static, designs, skip_already_evaluated=False)
@@ -110,7 +108,7 @@ def search(file: DesignFile, folder: Path, pool: Executor | None = None, progres
             algorithm.tell(infills=designs)
         last = generation == asked.generations
         while last or generation % asked.exchange == 0:
-            unit = _exchanged(file, sample, algorithm.pop, pool, everyone=last)
+            unit = _exchanged(file, sample, algorithm.pop, everyone=last)
             if len(unit) == len(sample.unit):
                 break
             sample = replace(sample, unit=unit)
@@ -157,14 +155,12 @@ def undominated(goals: Floats) -> Bools:
     return ~(worse | same).any(axis=1)
 
 
-def _exchanged(file: DesignFile, sample: Sample, designs: Any, pool: Executor | None, *, everyone: bool) -> Floats:
+def _exchanged(file: DesignFile, sample: Sample, designs: Any, *, everyone: bool) -> Floats:
     """Return the sample's unit poses with the worst poses of the best designs; everyone: of all on the front."""
     rows = _front(file, designs) or np.argsort(designs.get("CV").ravel(), kind="stable").tolist()
     even = np.unique(np.linspace(0, len(rows) - 1, len(rows) if everyone else min(WATCHED, len(rows))).astype(int))
     vectors = np.array(designs.get("X"), dtype=np.float64)[[rows[k] for k in even]]
-    work = partial(worst_poses, sample)
-    found = map(work, vectors) if pool is None else pool.map(work, vectors)
-    return np.unique(np.concatenate([sample.unit, *found]), axis=0)
+    return np.unique(np.concatenate([sample.unit, *(worst_poses(sample, vector) for vector in vectors)]), axis=0)
 
 
 def _note(file: DesignFile, designs: Any, count: int) -> str:

@@ -15,7 +15,7 @@ from pentapod.cli.progress import progress_bar
 @click.option("-o", "--out", type=click.Path(path_type=Path), default=Path("designs"), show_default=True,
               help="Folder for the files.")  # fmt: skip
 @click.option("-j", "--workers", type=click.IntRange(1), metavar="N",
-              help="Processes; the result is the same for any number.  [default: one for each core]")  # fmt: skip
+              help="Processes for proofs and parts; no file depends on it.  [default: one for each core]")  # fmt: skip
 @json_option
 @quiet_option
 def design(file: Path, out: Path, workers: int | None, as_json: bool, quiet: bool) -> int:
