@@ -114,12 +114,13 @@ def _climbed(
 ) -> tuple[Floats, Floats]:
     """Return unit poses (K, 5) near those given, one for each name, where its figure is greater; and the figures."""
     step = np.array([0.25, np.pi / options.around, 1.0 / max(options.levels - 1, 1), 0.25, np.pi / options.azimuths])
-    moves = np.stack([axis.ravel() for axis in np.meshgrid(*[(0.0, -1.0, 1.0)] * 5, indexing="ij")], axis=-1)
+    grid = np.meshgrid(*[(0.0, -1.0, 1.0)] * len(step), indexing="ij")  # the pose itself first: it is kept if all equal
+    moves = np.stack([axis.ravel() for axis in grid], axis=-1)
     worst = np.zeros(len(names))
     for _ in range(options.climbs if names else 0):
         near = poses[:, None] + step * moves
         near = np.clip(near, (0.0, -np.inf, -1.0, 0.0, -np.inf), (1.0, np.inf, 1.0, 1.0, np.inf))
-        found = figures(near.reshape(-1, 5))
+        found = figures(near.reshape(-1, len(step)))
         values = np.stack([found[name].reshape(len(names), -1)[row] for row, name in enumerate(names)])
         best, rows = np.nan_to_num(values, nan=-np.inf).argmax(axis=1), np.arange(len(names))
         poses, worst = near[rows, best], values[rows, best]
