@@ -221,8 +221,8 @@ def _view(subject: _Subject, title: str, axes: tuple[int, int], *, close: bool =
     as_at = "" if close else f" {subject.pose}"
     return (
         f'<figure><svg viewBox="0 0 {width:.1f} {height:.1f}" role="img" aria-label="{title}">{"".join(parts)}'
-        f'</svg><figcaption class="caption">{title}; {extent[0]:.0f} × {extent[1]:.0f} mm. The cross, origin of the '
-        f"mesh: {origin.replace('-', '−')} mm.{as_at}</figcaption></figure>"
+        f'</svg><figcaption class="caption">{title}; {extent[0]:.0f} × {extent[1]:.0f} mm. The cross, '
+        f"{subject.cross}: {origin.replace('-', '−')} mm.{as_at}</figcaption></figure>"
     )
 
 
