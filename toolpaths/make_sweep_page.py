@@ -86,8 +86,8 @@ def answer(rows: list[Row]) -> str:
 
 def main() -> None:
     """Run the sweep, and write its picture and its page."""
-    done = {outcome.folder: outcome.row for outcome in batch(Sweep.load(SWEEP), FOLDER.parent / "out" / "sweep")}
-    rows = sorted(done.values(), key=lambda row: (row[LENGTH], row[TILT]))
+    done = batch(Sweep.load(SWEEP), FOLDER.parent / "out" / "sweep")
+    rows = sorted(({**each.task.known, **each.row} for each in done), key=lambda row: (row[LENGTH], row[TILT]))
     draw(rows, DOCS / "gallery" / "sweep.png")
     text = SWEEP.read_text(encoding="utf-8")
     page = PAGE.format(sweep=text, table=table(rows), answer=answer(rows))
