@@ -19,6 +19,9 @@ import difflib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+LONGEST_NUMBER = 15
+"""Characters of a number from which a message rounds it."""
+
 LONGEST_SHOWN = 200
 """Characters of a value that a message shows."""
 
@@ -101,7 +104,9 @@ class ProgramError(InputError):
 def _shown(value: object) -> str:
     """Return a value for a message, shortened."""
     try:
-        text = f"{value:.12g}" if isinstance(value, float) else repr(value)
+        text = repr(value)
+        if isinstance(value, float) and len(text) > LONGEST_NUMBER:
+            text = f"{value:.12g}"  # 1.0000000000000001e-07 is what a conversion of units leaves
     except (ValueError, RecursionError):  # a whole number beyond 4,300 digits, or lists in lists in lists
         return f"{type(value).__name__} too large to show"
     return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 1] + "…"
