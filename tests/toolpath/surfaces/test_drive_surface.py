@@ -13,9 +13,10 @@ from pentapod.geometry.directions import angle_between
 from pentapod.mesh.passes import Passes
 from pentapod.toolpath import PencilOptions, SegmentKind, make_toolpath
 from pentapod.toolpath.strategies.raster import raster_paths
-from pentapod.toolpath.surfaces.ball_centres import DriveOptions, smoothed
+from pentapod.toolpath.surfaces.ball_centres import smoothed
 from pentapod.toolpath.surfaces.drive_surface import DriveSurface
 from pentapod.toolpath.surfaces.part_surface import PartSurface
+from pentapod.toolpath.surfaces.places import DriveOptions
 
 R, CHORDAL, UP = 3e-3, 5e-6, np.array([0.0, 0.0, 1.0])
 

@@ -1,7 +1,7 @@
-"""Drop cutter: where a ball comes to rest that is lowered onto a mesh.
+"""Drop cutter: where a cutter comes to rest that is lowered onto a mesh.
 
-It is the part of the offset surface that is seen from above, without its overhangs and walls. It shares no formula with
-`offset_surface`: tests hold what that leaves on a part against what this does.
+For a ball it is the part of the offset surface that is seen from above, without its overhangs and walls. It shares no
+formula with `offset_surface`: tests hold what that leaves on a part against what this does.
 """
 
 from __future__ import annotations
@@ -12,13 +12,14 @@ from pentapod.base.arrays import Floats
 from pentapod.mesh.query.tree import FacetTree
 
 
-def drop_cutter(tree: FacetTree, places: Floats, radius: float) -> Floats:
+def drop_cutter(tree: FacetTree, places: Floats, radius: float, disc: float = 0.0) -> Floats:
     """Return the height (N,) of the centre of a ball of `radius` metres that is dropped along −z at places (N, 2).
 
-    −inf where it meets nothing. Heights are exact.
+    disc: for a bull-nose end, or a flat end of no `radius`: that of the disc around which it is rounded, metres; the
+    height is the disc's, `radius` above the tip. −inf where the cutter meets nothing. Heights are exact.
     """
     from pentapod.mesh.offset.drop_kernels import drop_all  # noqa: PLC0415 - loads numba
 
-    heights = np.empty(len(places))
-    drop_all(np.ascontiguousarray(places), radius, tree.corners, tree.starts, tree.extents, heights)
+    heights, touches = np.empty(len(places)), np.empty((len(places), 4))
+    drop_all(np.ascontiguousarray(places), radius, disc, tree.corners, tree.starts, tree.extents, heights, touches)
     return heights

@@ -20,9 +20,9 @@ from pentapod.toolpath.options import CoverOptions, PathOptions
 from pentapod.toolpath.path_report import PathReport
 from pentapod.toolpath.strategy import ContactPaths, Strategy
 from pentapod.toolpath.surface import Surface
-from pentapod.toolpath.surfaces.ball_centres import DriveOptions
 from pentapod.toolpath.surfaces.drive_surface import DriveSurface
 from pentapod.toolpath.surfaces.part_surface import PartSurface
+from pentapod.toolpath.surfaces.places import DriveOptions
 from pentapod.toolpath.toolpath import Toolpath
 
 _NAMES = (

@@ -9,35 +9,32 @@ part. A ball is clear at a centre whatever its axis, so nothing of this depends 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats
-from pentapod.geometry.directions import tangent_frame, turned
-from pentapod.geometry.polyline import arc_length
+from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.offset.offset_surface import Window, offset_surface
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
-from pentapod.mesh.query.heightfield import HeightField
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.mesh.region import Region
 from pentapod.mesh.topology import components
-from pentapod.toolpath.lines.scallop import surface_steps
-from pentapod.toolpath.options import CoverOptions, PathOptions
-from pentapod.toolpath.surface import Contacts
-from pentapod.toolpath.surfaces.ball_centres import BallCentres, DriveOptions, smoothed
-from pentapod.toolpath.surfaces.ways_around import drawn_taut, shortest_ways
+from pentapod.toolpath.options import PathOptions
+from pentapod.toolpath.surfaces.ball_centres import BallCentres, smoothed
+from pentapod.toolpath.surfaces.places import DriveOptions
+from pentapod.toolpath.surfaces.rolled_surface import RolledSurface
 
 _KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, DriveOptions, bytes], tuple[FacetTree, Mesh]]] = WeakKeyDictionary()
 """Drive surfaces of parts that are in use: planning and the verdict need the same."""
 
 
 @dataclass(frozen=True, eq=False)
-class DriveSurface:
+class DriveSurface(RolledSurface):
     """The drive surface of a ball of `radius` metres over a part; mesh: the surface itself, facing outwards.
 
     view (3,): unit, towards the tool.
@@ -47,17 +44,16 @@ class DriveSurface:
     mesh: Mesh
     centres: BallCentres
     view: Floats
-    slides = True
 
     @property
-    def radius(self) -> float:
+    def places(self) -> BallCentres:
+        """Where the ball's centre may be."""
+        return self.centres
+
+    @property
+    def rounding(self) -> float:
         """Radius of the ball, metres."""
-        return self.centres.radius
-
-    @property
-    def options(self) -> DriveOptions:
-        """How the surface is made and used."""
-        return self.centres.options
+        return self.radius
 
     @classmethod
     def of(
@@ -84,16 +80,6 @@ class DriveSurface:
             known[key] = tree, mesh
         tree, mesh = known[key]
         return cls(part, mesh, BallCentres(tree, radius, options), view)
-
-    @cached_property
-    def field(self) -> HeightField:
-        """Ray casting along the view."""
-        return HeightField(self.mesh, self.view)
-
-    @property
-    def part_field(self) -> HeightField:
-        """Ray casting onto the part along the view."""
-        return HeightField(self.part, self.view)
 
     def hides(self, points: Floats, slack: float) -> Bools:
         """Return whether the drive surface lies above points (N, 3) on it by more than `slack` metres."""
@@ -136,17 +122,6 @@ class DriveSurface:
         patch = patch.where_normals(partial(region.faces, default=0.5 * np.pi))
         return patch if self.part.topology.watertight else patch.above(-self._beyond_border(patch), 0.0)[0]
 
-    def steps(self, patch: Patch, across: Floats, options: CoverOptions) -> Floats:
-        """Return the stepover (F,) on each facet, along the drive surface. Raises ToolpathError as `surface_steps`."""
-        steps = surface_steps(patch, self.radius, across, options, offset=True)
-        if options.stepover is None:
-            corners = patch.faces.ravel()
-            facets = np.maximum(np.bincount(corners, minlength=len(patch.vertices)), 1)
-            for _ in range(self.options.evened):
-                mean = np.bincount(corners, weights=np.repeat(steps, 3), minlength=len(facets)) / facets
-                steps = mean[patch.faces].mean(axis=1)
-        return steps
-
     def waypoints(self, passes: Passes, options: PathOptions) -> Passes:
         """Return contacts and unit normals for lines on the drive surface, their centres put exactly on the offset.
 
@@ -157,58 +132,6 @@ class DriveSurface:
         exact = self.centres.midway(exact)
         normals = smoothed(exact, self.options.window * self.radius)
         return replace(exact, points=exact.points - self.radius * normals, normals=normals)
-
-    def links(
-        self, ends: dict[int, tuple[Contacts, Contacts]], options: PathOptions, stepover: float
-    ) -> dict[int, Contacts]:
-        """Return the links on the surface between pairs of passes; axes turn evenly.
-
-        They are straight (`BallCentres.ways`), or else lead around what is in the way, within the region.
-        """
-        del stepover
-        if not ends:
-            return {}
-        first, last = (
-            (
-                np.stack([pair[k][0][row] for pair in ends.values()]),
-                np.stack([pair[k][1][row] for pair in ends.values()]),
-            )
-            for k, row in ((0, -1), (1, 0))
-        )
-        starts, stops = (contacts + self.radius * normals for contacts, normals in (first, last))
-        told = options.spacing, options.chordal, min(options.closest, options.chordal)
-        ways = self._seen(self.centres.ways(starts, stops, *told), options.chordal)
-        missed = [row for row, way in enumerate(ways) if way is None]
-        for row, way in zip(missed, self._around(starts[missed], stops[missed], options), strict=True):
-            ways[row] = way
-        found: dict[int, Contacts] = {}
-        for row, (key, way) in enumerate(zip(ends, ways, strict=True)):
-            if way is not None:
-                length = arc_length(way)
-                share = length / length[-1] if length[-1] > 0.0 else np.linspace(0.0, 1.0, len(way))
-                normals = turned(first[1][row], last[1][row], share, self.view)
-                contacts = way - self.radius * normals
-                for end, (contact, normal) in ((0, (first[0][row], first[1][row])), (-1, (last[0][row], last[1][row]))):
-                    contacts[end], normals[end] = contact, normal
-                found[key] = contacts, normals
-        return found
-
-    def _around(self, starts: Floats, ends: Floats, options: PathOptions) -> list[Floats | None]:
-        """Return ways (n, 3) between pairs of centres (L, 3) around what is between them, where there is one."""
-        if not len(starts):
-            return []
-        patch = self.patch(options.region)
-        seen = ~self.hides(patch.vertices, options.chordal)
-        over = np.linalg.norm(ends - starts, axis=1) + 2.0 * options.clearance
-        longest = self.options.around * over
-        lines = shortest_ways(patch, seen, starts, ends, longest)
-        rows = [row for row, line in enumerate(lines) if line is not None]
-        found = [line for line in lines if line is not None]
-        told = options.spacing, options.chordal, min(options.closest, options.chordal)
-        allowed = partial(self._seen, slack=options.chordal)
-        for row, way in zip(rows, drawn_taut(self.centres, found, *told, allowed), strict=True):
-            lines[row] = way
-        return lines
 
     def _seen(self, ways: list[Floats | None], slack: float) -> list[Floats | None]:
         """Return ways (n, 3) of centres, None for those on which the part lies above: there only the ball has room.
@@ -229,14 +152,11 @@ class DriveSurface:
         gone = iter(hidden.tolist())
         return [None if way is None or next(gone) else way for way in ways]
 
-    def is_clear(self, centres: Floats, chordal: float) -> bool:
-        """Return whether the ball is clear of the part but for `chordal` metres along a line of centres (n, 3)."""
-        return bool(self.centres.clear(centres[:-1], centres[1:], self.radius - chordal).all())
+    def _at(self, contacts: Floats, normals: Floats) -> Floats:
+        return contacts + self.radius * normals
 
-    def tight(self, passes: Passes) -> int:
-        """Return 0: the ball is clear of the part on the drive surface."""
-        del passes
-        return 0
+    def _contacts(self, places: Floats, normals: Floats) -> Floats:
+        return places - self.radius * normals
 
     def contacts(self, centres: Floats) -> Floats:
         """Return the points (N, 3) of the part that are nearest to centres (N, 3): where the ball touches."""

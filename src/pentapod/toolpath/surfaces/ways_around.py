@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats
 from pentapod.mesh.patch import Patch
-from pentapod.toolpath.surfaces.ball_centres import BallCentres
+from pentapod.toolpath.surfaces.places import Places
 
 Pair = tuple[int, int, int]
 """Number of a line, and two of its points."""
@@ -47,16 +47,16 @@ def shortest_ways(patch: Patch, open_to: Bools, starts: Floats, ends: Floats, lo
 
 
 def drawn_taut(
-    centres: BallCentres,
+    centres: Places,
     lines: list[Floats],
     spacing: float,
     chordal: float,
     closest: float,
     allowed: Callable[[list[Floats | None]], list[Floats | None]],
 ) -> list[Floats | None]:
-    """Return ways of a ball's centre along lines (n, 3), with corners only where it cannot go straight.
+    """Return ways of a cutter along lines (n, 3), with corners only where it cannot go straight.
 
-    Between corners, which are points of the line, they are those of `BallCentres.ways`, and proven as these are.
+    Between corners, which are points of the line, they are those of `Places.ways`, and proven as these are.
     allowed: returns ways, None for those that are not to be taken. None where even neighbouring points have no way.
     """
     lines = [np.concatenate([line[:1], centres.on_level(line[1:-1]), line[-1:]]) for line in lines]

@@ -1,0 +1,159 @@
+"""Rolled surface: what drive surfaces of all cutters have in common: links on them, stepovers, what is known as clear.
+
+Lines are drawn on its mesh as on any mesh. Points are then put exactly on the surface, and chords between them proven.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cached_property, partial
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats
+from pentapod.geometry.directions import turned
+from pentapod.geometry.polyline import arc_length
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.passes import Passes
+from pentapod.mesh.patch import Patch
+from pentapod.mesh.query.heightfield import HeightField
+from pentapod.mesh.region import Region
+from pentapod.toolpath.lines.scallop import surface_steps
+from pentapod.toolpath.options import CoverOptions, PathOptions
+from pentapod.toolpath.surface import Contacts
+from pentapod.toolpath.surfaces.places import DriveOptions, Places
+from pentapod.toolpath.surfaces.ways_around import drawn_taut, shortest_ways
+
+
+class RolledSurface(ABC):
+    """Where a cutter is that rolls over a part; mesh: the surface itself, facing outwards.
+
+    centres: of the cutter, as points of the mesh. view (3,): unit, towards the tool.
+    """
+
+    part: Mesh
+    mesh: Mesh
+    view: Floats
+    slides = True
+
+    @property
+    @abstractmethod
+    def places(self) -> Places:
+        """Where the cutter may be."""
+
+    @property
+    @abstractmethod
+    def rounding(self) -> float | None:
+        """Radius in metres of the rounding that leaves scallops between passes; None if there is none."""
+
+    @abstractmethod
+    def hides(self, points: Floats, slack: float) -> Bools:
+        """Return whether the surface lies above points (N, 3) on it by more than `slack` metres."""
+
+    @abstractmethod
+    def patch(self, region: Region) -> Patch:
+        """Return the part of the surface from which the cutter touches a region; empty where there is none."""
+
+    @abstractmethod
+    def _at(self, contacts: Floats, normals: Floats) -> Floats:
+        """Return the places (N, 3) of contacts (N, 3) with unit normals (N, 3)."""
+
+    @abstractmethod
+    def _contacts(self, places: Floats, normals: Floats) -> Floats:
+        """Return the contacts (N, 3) of places (N, 3) with unit normals (N, 3)."""
+
+    @abstractmethod
+    def _seen(self, ways: list[Floats | None], slack: float) -> list[Floats | None]:
+        """Return ways (n, 3) of the cutter, None for those on which the part lies above."""
+
+    @property
+    def radius(self) -> float:
+        """Radius of the cutter, metres."""
+        return self.places.radius
+
+    @property
+    def options(self) -> DriveOptions:
+        """How the surface is made and used."""
+        return self.places.options
+
+    @cached_property
+    def field(self) -> HeightField:
+        """Ray casting along the view."""
+        return HeightField(self.mesh, self.view)
+
+    @property
+    def part_field(self) -> HeightField:
+        """Ray casting onto the part along the view."""
+        return HeightField(self.part, self.view)
+
+    def steps(self, patch: Patch, across: Floats, options: CoverOptions) -> Floats:
+        """Return the stepover (F,) on each facet, along the drive surface. Raises ToolpathError as `surface_steps`."""
+        steps = surface_steps(patch, self.rounding, across, options, offset=True)
+        if options.stepover is None:
+            corners = patch.faces.ravel()
+            facets = np.maximum(np.bincount(corners, minlength=len(patch.vertices)), 1)
+            for _ in range(self.options.evened):
+                mean = np.bincount(corners, weights=np.repeat(steps, 3), minlength=len(facets)) / facets
+                steps = mean[patch.faces].mean(axis=1)
+        return steps
+
+    def links(
+        self, ends: dict[int, tuple[Contacts, Contacts]], options: PathOptions, stepover: float
+    ) -> dict[int, Contacts]:
+        """Return the links on the surface between pairs of passes; axes turn evenly.
+
+        They are straight (`Places.ways`), or else lead around what is in the way, within the region.
+        """
+        del stepover
+        if not ends:
+            return {}
+        first, last = (
+            (
+                np.stack([pair[k][0][row] for pair in ends.values()]),
+                np.stack([pair[k][1][row] for pair in ends.values()]),
+            )
+            for k, row in ((0, -1), (1, 0))
+        )
+        starts, stops = (self._at(contacts, normals) for contacts, normals in (first, last))
+        told = options.spacing, options.chordal, min(options.closest, options.chordal)
+        ways = self._seen(self.places.ways(starts, stops, *told), options.chordal)
+        missed = [row for row, way in enumerate(ways) if way is None]
+        for row, way in zip(missed, self._around(starts[missed], stops[missed], options), strict=True):
+            ways[row] = way
+        found: dict[int, Contacts] = {}
+        for row, (key, way) in enumerate(zip(ends, ways, strict=True)):
+            if way is not None:
+                length = arc_length(way)
+                share = length / length[-1] if length[-1] > 0.0 else np.linspace(0.0, 1.0, len(way))
+                normals = turned(first[1][row], last[1][row], share, self.view)
+                contacts = self._contacts(way, normals)
+                for end, (contact, normal) in ((0, (first[0][row], first[1][row])), (-1, (last[0][row], last[1][row]))):
+                    contacts[end], normals[end] = contact, normal
+                found[key] = contacts, normals
+        return found
+
+    def _around(self, starts: Floats, ends: Floats, options: PathOptions) -> list[Floats | None]:
+        """Return ways (n, 3) between pairs of centres (L, 3) around what is between them, where there is one."""
+        if not len(starts):
+            return []
+        patch = self.patch(options.region)
+        seen = ~self.hides(patch.vertices, options.chordal)
+        over = np.linalg.norm(ends - starts, axis=1) + 2.0 * options.clearance
+        longest = self.options.around * over
+        lines = shortest_ways(patch, seen, starts, ends, longest)
+        rows = [row for row, line in enumerate(lines) if line is not None]
+        found = [line for line in lines if line is not None]
+        told = options.spacing, options.chordal, min(options.closest, options.chordal)
+        allowed = partial(self._seen, slack=options.chordal)
+        for row, way in zip(rows, drawn_taut(self.places, found, *told, allowed), strict=True):
+            lines[row] = way
+        return lines
+
+    def is_clear(self, centres: Floats, chordal: float) -> bool:
+        """Return whether the cutter is clear of the part but for `chordal` metres along a line of centres (n, 3)."""
+        return bool(self.places.clear(centres[:-1], centres[1:], chordal).all())
+
+    def tight(self, passes: Passes) -> int:
+        """Return 0: the cutter is clear of the part on the drive surface."""
+        del passes
+        return 0
