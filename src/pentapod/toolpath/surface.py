@@ -44,6 +44,11 @@ class Surface(Protocol):
         """Whether links on the surface are proven clear, and so may be of any length."""
         ...
 
+    @property
+    def turns(self) -> bool:
+        """Whether the tool's axis may turn with the normals of its lines; not where it is fixed."""
+        ...
+
     def hides(self, points: Floats, slack: float) -> Bools:
         """Return whether `mesh` lies above points (N, 3) on it, along the view, by more than `slack` metres."""
         ...

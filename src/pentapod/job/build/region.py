@@ -6,12 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import fields_from
 from pentapod.base.units import from_si
 from pentapod.base.values import Value
+from pentapod.cutters.bull_nose import BullNose
 from pentapod.cutters.mounted import BallEnded
 from pentapod.cutters.registry import CUTTERS
+from pentapod.geometry.directions import normalised
 from pentapod.job.schema.job import Job
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.region import ON_PART, Region
@@ -45,11 +48,19 @@ def job_region(job: Job) -> Region:
 
 
 def rolls(job: Job) -> bool:
-    """Return whether the job's strategy draws on the drive surface of a ball."""
-    strategy = job.toolpath.strategy
-    return (
-        strategy in STRATEGIES and STRATEGIES[strategy].options.rolls and issubclass(CUTTERS[job.tool.type], BallEnded)
-    )
+    """Return whether the job's strategy draws on the surface on which its cutter rolls over the part."""
+    strategy, cutter = job.toolpath.strategy, CUTTERS[job.tool.type]
+    if strategy not in STRATEGIES or not STRATEGIES[strategy].options.rolls:
+        return False
+    return issubclass(cutter, BallEnded) or (issubclass(cutter, BullNose) and kept_axis(job) is not None)
+
+
+def kept_axis(job: Job) -> Floats | None:
+    """Return the axis (3,), unit, that the job's tool keeps everywhere; None where the axis may turn."""
+    axis = job.axis.si
+    if axis.mode != "fixed" or axis.tilt or axis.lead or axis.side:
+        return None
+    return np.asarray(normalised(axis.direction))
 
 
 def covers_region(job: Job) -> bool:

@@ -17,7 +17,7 @@ from pentapod.cutters.mounted import BallEnded, Mounted
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.solids import Cone
-from pentapod.job.build.region import covers_region, job_region, region_report
+from pentapod.job.build.region import covers_region, job_region, kept_axis, region_report
 from pentapod.job.build.tool import job_tool
 from pentapod.job.build.words import in_words_of
 from pentapod.job.schema.job import Job
@@ -144,7 +144,7 @@ def job_toolpath(
         if covers_region(job):
             region.append(region_report(job, mesh))
         try:
-            toolpath, report = toolpath_with_report(mesh, tool, asked)
+            toolpath, report = toolpath_with_report(mesh, tool, asked, kept_axis(job))
         except (MeshError, ToolpathError) as error:
             raise in_words_of(job, error) from error
         toolpath = stepped(oriented(toolpath, tool, _orientation(job, tool)), job.toolpath.si.axis_step)

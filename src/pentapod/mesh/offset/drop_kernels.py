@@ -124,10 +124,8 @@ def _on_edge(a: Floats, b: Floats, x: float, y: float, radius: float, disc: floa
         if aside < radius + disc:
             along, slope = wx * dx + wy * dy, (b[2] - a[2]) / length
             reach = math.copysign(_reach_along(aside, abs(slope), radius, disc), slope)
-            if reach == 0.0:
-                at = min(max(along, 0.0), length)  # level: the nearest place
-            else:
-                at = along + reach
+            # Of a level edge the nearest place.
+            at = along + reach if reach != 0.0 else min(max(along, 0.0), length)
             if 0.0 <= at <= length:
                 out = math.sqrt(aside * aside + (at - along) ** 2)
                 qz = a[2] + at * slope

@@ -60,7 +60,7 @@ def cross_tips(
 
 @kernel
 def drop_normals(places: Floats, heights: Floats, touches: Floats, normals: Floats) -> None:
-    """Fill normals (N, 3) of the surface at places (N, 2) where cutters rest at heights (N,). touches: of `drop_all`."""
+    """Fill normals (N, 3) where cutters at places (N, 2) rest at heights (N,). touches (N, 4): of `drop_all`."""
     for m in range(len(places)):
         _normal(heights[m], heights[m], places[m, 0], places[m, 1], 0.0, touches[m], normals[m])
 

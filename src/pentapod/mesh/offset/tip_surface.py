@@ -13,13 +13,15 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.base.errors import MeshError
 from pentapod.geometry.runs import members
+from pentapod.mesh.normals import unit_or_zero
 from pentapod.mesh.offset.dual_contouring import Cells, Crossings, Grid, dual_contour
 from pentapod.mesh.query.tree import FacetTree
 
 MOST_NODES = 30_000_000
 _SHIFT = np.array([0.3819660, 0.2679492, 0.4142136])
 """Shares of a step by which the grid is off the part, so that flat faces do not lie in its planes."""
-_HALVINGS = 18
+_HALVINGS, _NEAR, _EXACT = 18, 0.5, 1e-6
+"""Of edges, to find where the surface crosses them; how far and exactly vertices are moved onto it, in steps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +41,23 @@ class Lowered:
 
     def heights(self, places: Floats) -> tuple[Floats, Floats]:
         """Return the lowest heights (N,) of the tip at places (N, 2), −inf for none, and unit normals (N, 3) there."""
-        from pentapod.mesh.offset.drop_kernels import drop_all  # noqa: PLC0415  loads numba
-        from pentapod.mesh.offset.tip_kernels import drop_normals  # noqa: PLC0415
+        from pentapod.mesh.offset.tip_kernels import drop_normals  # noqa: PLC0415  loads numba
 
-        places = np.ascontiguousarray(places)
-        heights, touches, normals = np.empty(len(places)), np.empty((len(places), 4)), np.empty((len(places), 3))
-        drop_all(places, self.radius, self.disc, *self._hierarchy, heights, touches)
-        drop_normals(places, heights, touches, normals)
+        heights, touches = self._dropped(places)
+        normals = np.empty((len(places), 3))
+        drop_normals(np.ascontiguousarray(places), heights, touches, normals)
         return heights - self.radius, normals
+
+    def touched(self, places: Floats) -> Floats:
+        """Return what (N, 3) the cutter touches that is lowered at places (N, 2); NaN where that is nothing."""
+        return self._dropped(places)[1][:, :3]
+
+    def _dropped(self, places: Floats) -> tuple[Floats, Floats]:
+        from pentapod.mesh.offset.drop_kernels import drop_all  # noqa: PLC0415  loads numba
+
+        heights, touches = np.empty(len(places)), np.full((len(places), 4), np.nan)
+        drop_all(np.ascontiguousarray(places), self.radius, self.disc, *self._hierarchy, heights, touches)
+        return heights, touches
 
     def meets(self, tips: Floats) -> Bools:
         """Return at which tips (N, 3) the cutter, as high as the part, cuts into it."""
@@ -83,7 +94,8 @@ class Lowered:
         keys, outside = _nodes(top.reshape(tuple(size[:2])), size)
         crossings = self._crossings(grid, columns, top, heights, normals)
         vertices, triangles, _ = dual_contour(Cells(grid, 1, np.empty(0, dtype=np.intp)), keys, outside, crossings)
-        return vertices, triangles
+        normals = _vertex_normals(vertices, triangles)
+        return self.settled(vertices, normals, _NEAR * step, _EXACT * step)[0], triangles
 
     def _crossings(self, grid: Grid, columns: Ints, top: Ints, heights: Floats, normals: Floats) -> Crossings:
         """Return where the surface crosses the grid's edges. top (C,): the highest node inside in each column."""
@@ -132,6 +144,14 @@ def _nodes(top: Ints, size: Ints) -> tuple[Ints, Bools]:
     column, number = members(counts)
     level = first[column] + number
     return column * size[2] + level, np.asarray(level > top.ravel()[column])
+
+
+def _vertex_normals(vertices: Floats, triangles: Ints) -> Floats:
+    """Return normals (V, 3) of vertices, the means of those of the triangles at them, unit."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    normals = np.zeros_like(vertices)
+    np.add.at(normals, triangles.ravel(), np.repeat(np.cross(b - a, c - a), 3, axis=0))
+    return unit_or_zero(normals)
 
 
 def _too_fine(step: float) -> MeshError:

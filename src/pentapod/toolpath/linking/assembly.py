@@ -114,7 +114,7 @@ def _waypoints(
         replace(passes, levels=np.arange(len(passes))),
         chordal=options.chordal,
         spacing=options.spacing,
-        axis_step=options.axis_step,
+        axis_step=options.axis_step if surface.turns else np.inf,
         closest=min(options.closest, options.chordal),
     )
     if not paths.visible:

@@ -7,9 +7,11 @@ from functools import partial
 
 import numpy as np
 
+from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError, nearest
 from pentapod.base.keys import check_size
 from pentapod.base.registry import Registry
+from pentapod.cutters.bull_nose import BullNose
 from pentapod.cutters.tool import Tool
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.passes import Passes
@@ -23,6 +25,7 @@ from pentapod.toolpath.surface import Surface
 from pentapod.toolpath.surfaces.drive_surface import DriveSurface
 from pentapod.toolpath.surfaces.part_surface import PartSurface
 from pentapod.toolpath.surfaces.places import DriveOptions
+from pentapod.toolpath.surfaces.tip_surface import TipSurface
 from pentapod.toolpath.toolpath import Toolpath
 
 _NAMES = (
@@ -61,15 +64,20 @@ def strategy_of(options: PathOptions) -> Strategy:
     raise ToolpathError("no strategy takes these options", value=name, remedy=nearest(name, known))
 
 
-def toolpath_with_report(mesh: Mesh, tool: Tool, options: PathOptions) -> tuple[Toolpath, PathReport]:
+def toolpath_with_report(
+    mesh: Mesh, tool: Tool, options: PathOptions, axis: Floats | None = None
+) -> tuple[Toolpath, PathReport]:
     """Return the toolpath of the strategy that takes these options, and its report.
+
+    axis (3,): unit, of a tool that does not turn: then a bull-nose or flat end rolls over the part as a ball does. None
+    for axes along the surface's normals.
 
     Raises ToolpathError if nothing is left to machine, if the options do not suit part or tool, or if a length is much
     larger than the part, as one in millimetres would be.
     """
     strategy = strategy_of(options)
     check_size(options, float(np.ptp(mesh.bounds, axis=0).max()), ToolpathError)
-    surface = surface_for(mesh, tool, options)
+    surface = surface_for(mesh, tool, options, axis)
     return assembled(
         strategy.name, surface, tool, options, with_fills(surface, strategy.paths(surface, options), options)
     )
@@ -80,12 +88,18 @@ def rolls_over(tool: Tool, options: PathOptions) -> bool:
     return tool.tilt_centre > 0.0 and tool.scallop_radius == tool.tilt_centre and options.rolls
 
 
-def surface_for(mesh: Mesh, tool: Tool, options: PathOptions) -> Surface:
-    """Return the surface on which a strategy draws: for a ball that covers a part, its drive surface."""
+def surface_for(mesh: Mesh, tool: Tool, options: PathOptions, axis: Floats | None = None) -> Surface:
+    """Return the surface on which a strategy draws: where a cutter covers a part, that on which it rolls over it.
+
+    axis: as for `toolpath_with_report`.
+    """
     if rolls_over(tool, options):
         under = options.under if isinstance(options, CoverOptions) else None
         drive = DriveOptions() if under is None else DriveOptions().leaning(under / tool.tilt_centre)
         return DriveSurface.of(mesh, tool.tilt_centre, options.up, drive, options.region)
+    if axis is not None and isinstance(tool, BullNose) and options.rolls:
+        stepover = options.stepover if isinstance(options, CoverOptions) else None
+        return TipSurface.of(mesh, tool, axis, options.up, 0.25 * (stepover or np.inf))
     return PartSurface(mesh, tool, options.up)
 
 
@@ -101,10 +115,12 @@ def with_fills(surface: Surface, paths: ContactPaths, options: PathOptions) -> C
     creases = uncrossed(crease_lines(patch), paths.passes, paths.stepover, surface.radius)
     passes = Passes.joined([paths.passes, creases])
     hides = partial(surface.hides, slack=options.chordal)
+    if surface.turns is False:
+        return replace(paths, passes=passes) if len(creases) else paths
     rest = rest_lines(patch, passes, surface.radius, paths.stepover, hides, options.shortest)
     return replace(paths, passes=Passes.joined([passes, rest])) if len(creases) + len(rest) else paths
 
 
-def make_toolpath(mesh: Mesh, tool: Tool, options: PathOptions) -> Toolpath:
+def make_toolpath(mesh: Mesh, tool: Tool, options: PathOptions, axis: Floats | None = None) -> Toolpath:
     """Return the toolpath of `toolpath_with_report`."""
-    return toolpath_with_report(mesh, tool, options)[0]
+    return toolpath_with_report(mesh, tool, options, axis)[0]

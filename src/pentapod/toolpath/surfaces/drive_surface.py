@@ -13,7 +13,6 @@ from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats
 from pentapod.geometry.directions import tangent_frame
@@ -23,7 +22,6 @@ from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.mesh.region import Region
-from pentapod.mesh.topology import components
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.surfaces.ball_centres import BallCentres, smoothed
 from pentapod.toolpath.surfaces.places import DriveOptions
@@ -162,34 +160,10 @@ class DriveSurface(RolledSurface):
         """Return the points (N, 3) of the part that are nearest to centres (N, 3): where the ball touches."""
         return centres - self.centres.tree.closest(centres)[1]
 
-    def _beyond_border(self, patch: Patch) -> Floats:
-        """Return how far (V,) the ball's centre is beyond the part's open border at vertices; negative above facets.
-
-        Measured across the border in the plane of the facet there. Holes that the ball cannot enter are no border.
-        """
-        gap, away, facet = self.centres.tree.closest(patch.vertices)
-        corners = self.part.vertices[self.part.topology.edges[self.part.topology.facets_at_edge == 1]]
-        step = self.options.border * self.radius
-        count = np.ceil(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1) / step).astype(np.intp) + 1
-        edge = np.repeat(np.arange(len(count)), count)
-        share = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)) / (count - 1)[edge]
-        border = corners[edge, 0] + share[:, None] * (corners[edge, 1] - corners[edge, 0])
-        # Farther from the border than any vertex next to a crossing, the distance makes no difference: a search that
-        # is not bounded takes long in the middle of a straight border, where much of it is about as near.
-        sides = np.stack([patch.faces, np.roll(patch.faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-        longest = np.linalg.norm(patch.vertices[sides[:, 1]] - patch.vertices[sides[:, 0]], axis=1).max(initial=0.0)
-        far = longest + 2.0 * self.radius + step
-        near = np.minimum(KDTree(border).query(patch.vertices - away, distance_upper_bound=far)[0], far)
+    def _over(self, points: Floats) -> tuple[Floats, Floats]:
+        gap, away, facet = self.centres.tree.closest(points)
         upright = np.einsum("ni,ni->n", self.part.facet_normals[self.centres.tree.facets[facet]], away)
-        over = np.sqrt(np.maximum(gap**2 - upright**2, 0.0))
-        beyond = np.where((near < step) & (over > step), over, -near)
-        # A ball over a hole smaller than itself is beyond its border, but not far.
-        sides = sides[(beyond[sides] > 0.0).all(axis=1)]
-        number, piece = components(len(beyond), sides[:, 0], sides[:, 1])
-        furthest = np.full(number, -np.inf)
-        np.maximum.at(furthest, piece, beyond)
-        bridged = (beyond > 0.0) & (furthest[piece] < self.options.enters * self.radius)
-        return np.where(bridged, -step, beyond)
+        return points - away, np.sqrt(np.maximum(gap**2 - upright**2, 0.0))
 
 
 def _window(part: Mesh, radius: float, view: Floats, options: DriveOptions, region: Region) -> Window | None:

@@ -30,6 +30,7 @@ class PartSurface:
     view: Floats
     radius = 0.0
     slides = False
+    turns = True
 
     @property
     def mesh(self) -> Mesh:

@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from functools import cached_property, partial
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats
 from pentapod.geometry.directions import turned
@@ -18,6 +19,7 @@ from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.heightfield import HeightField
 from pentapod.mesh.region import Region
+from pentapod.mesh.topology import components
 from pentapod.toolpath.lines.scallop import surface_steps
 from pentapod.toolpath.options import CoverOptions, PathOptions
 from pentapod.toolpath.surface import Contacts
@@ -35,6 +37,7 @@ class RolledSurface(ABC):
     mesh: Mesh
     view: Floats
     slides = True
+    turns = True
 
     @property
     @abstractmethod
@@ -61,6 +64,10 @@ class RolledSurface(ABC):
     @abstractmethod
     def _contacts(self, places: Floats, normals: Floats) -> Floats:
         """Return the contacts (N, 3) of places (N, 3) with unit normals (N, 3)."""
+
+    @abstractmethod
+    def _over(self, points: Floats) -> tuple[Floats, Floats]:
+        """Return what a cutter at places (N, 3) touches, (N, 3), and how far (N,) it is across from its facet."""
 
     @abstractmethod
     def _seen(self, ways: list[Floats | None], slack: float) -> list[Floats | None]:
@@ -157,3 +164,30 @@ class RolledSurface(ABC):
         """Return 0: the cutter is clear of the part on the drive surface."""
         del passes
         return 0
+
+    def _beyond_border(self, patch: Patch) -> Floats:
+        """Return how far (V,) the cutter is beyond the part's open border at vertices; negative above facets.
+
+        Measured across the border in the plane of the facet there. Holes that the cutter cannot enter are no border.
+        """
+        contacts, over = self._over(patch.vertices)
+        corners = self.part.vertices[self.part.topology.edges[self.part.topology.facets_at_edge == 1]]
+        step = self.options.border * self.radius
+        count = np.ceil(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1) / step).astype(np.intp) + 1
+        edge = np.repeat(np.arange(len(count)), count)
+        share = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)) / (count - 1)[edge]
+        border = corners[edge, 0] + share[:, None] * (corners[edge, 1] - corners[edge, 0])
+        # Farther from the border than any vertex next to a crossing, the distance makes no difference: a search that
+        # is not bounded takes long in the middle of a straight border, where much of it is about as near.
+        sides = np.stack([patch.faces, np.roll(patch.faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+        longest = np.linalg.norm(patch.vertices[sides[:, 1]] - patch.vertices[sides[:, 0]], axis=1).max(initial=0.0)
+        far = longest + 2.0 * self.radius + step
+        near = np.minimum(KDTree(border).query(contacts, distance_upper_bound=far)[0], far)
+        beyond = np.where((near < step) & (over > step), over, -near)
+        # A cutter over a hole smaller than itself is beyond its border, but not far.
+        sides = sides[(beyond[sides] > 0.0).all(axis=1)]
+        number, piece = components(len(beyond), sides[:, 0], sides[:, 1])
+        furthest = np.full(number, -np.inf)
+        np.maximum.at(furthest, piece, beyond)
+        bridged = (beyond > 0.0) & (furthest[piece] < self.options.enters * self.radius)
+        return np.where(bridged, -step, beyond)
