@@ -31,8 +31,8 @@ class DriveOptions(Value):
     as shares of the radius: walls, and valleys between steep flanks, do not hide themselves, nor do walls that lean
     under by less. under: the same as `sideways` for links, which may lead a little farther; upright: and for those
     between ends over which nothing leans. evened: how often the stepover for a scallop is averaged with that of
-    neighbouring facets, whose curvature is noisy. reach: how far a place of the tip is moved onto its surface, as a
-    share of the radius.
+    neighbouring facets, whose curvature is noisy. reach, aside: how far a place of the tip is moved onto its surface
+    from near it, and sideways on a link, as shares of the radius.
     """
 
     step: float = 0.25
@@ -54,6 +54,7 @@ class DriveOptions(Value):
     above: float = 0.2
     evened: int = 2
     reach: float = 0.25
+    aside: float = 0.5
 
     def leaning(self, share: float) -> DriveOptions:
         """Return options by which the surface may lean over a point by a share of the radius."""

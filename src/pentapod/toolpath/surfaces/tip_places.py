@@ -50,22 +50,22 @@ class TipPlaces(Places):
         return points @ self.frame, held
 
     def on_level(self, points: Floats) -> Floats:
-        """Return points (N, 3) that are not clear moved beside what is in the way if it is near, else upwards."""
-        local = points @ self.frame.T
-        rows = np.flatnonzero(self.lowered.meets(local))
-        points, (heights, normals) = points.copy(), self.lowered.heights(local[rows, :2])
-        level = heights > local[rows, 2] + self.options.beside * self.radius
-        points[rows], held = self._settled(local[rows], np.where(level[:, None], normals * [1, 1, 0], UP), 0.05)
-        points[rows[~held]] = self.raised(points[rows[~held]])
-        return points
+        """Return points (N, 3), those that are not clear moved onto the surface: see `raised`."""
+        return self.raised(points)
 
     def raised(self, points: Floats) -> Floats:
-        """Return points (N, 3), those that are not clear moved upwards onto the surface."""
-        local = points @ self.frame.T
+        """Return points (N, 3), those that are not clear moved onto the surface: upwards, or aside if that is nearer.
+
+        Aside is away from what would hold the cutter up.
+        """
+        local, points = points @ self.frame.T, points.copy()
         rows = np.flatnonzero(self.lowered.meets(local))
-        local[rows, 2] = self.lowered.heights(local[rows, :2])[0]
-        points = points.copy()
-        points[rows] = local[rows] @ self.frame
+        local = local[rows]
+        above = np.column_stack([local[:, :2], self.lowered.heights(local[:, :2])[0]])
+        away = (local - self.lowered.touched(local[:, :2])) * [1.0, 1.0, 0.0]
+        aside, held = self._settled(local, away, self.options.aside)
+        nearer = held & (np.linalg.norm(aside - points[rows], axis=1) < above[:, 2] - local[:, 2])
+        points[rows] = np.where(nearer[:, None], aside, above @ self.frame)
         return points
 
     def clear(self, starts: Floats, ends: Floats, chordal: float) -> Bools:

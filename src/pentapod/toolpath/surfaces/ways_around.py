@@ -72,7 +72,7 @@ def drawn_taut(
     while open_pairs := [pair for pair in _pairs(corners) if pair not in known]:
         find(open_pairs)
         for k, first, last in open_pairs:
-            if known[k, first, last] is None:
+            if known[k, first, last] is None and corners[k]:
                 middle = (first + last) // 2
                 corners[k] = [] if middle == first else sorted({*corners[k], middle})
     skipped = True
