@@ -150,7 +150,9 @@ def left_by_end(reachable: ReachableTips, points, toolpath: Toolpath, stepover: 
     """Measure what a toolpath leaves on points of a part, and how it moves."""
     tool = reachable.tool
     lines = [(s.tips, s.kind) for s in toolpath.segments]
-    length = {k: sum(np.linalg.norm(np.diff(x, axis=0), axis=1).sum() for x, kind in lines if kind is k) for k in SegmentKind}
+    length = {
+        k: sum(np.linalg.norm(np.diff(x, axis=0), axis=1).sum() for x, kind in lines if kind is k) for k in SegmentKind
+    }
     gap, home = Nearest(tool, reachable.tips).of(points)
     cuts = np.concatenate([dense(line, 1e-4) for line, kind in lines if kind is SegmentKind.CUT])
     near, allowed = KDTree(reachable.tips), np.zeros(len(points))

@@ -42,12 +42,18 @@ class CreaseOptions:
     left: float = 1.1
 
 
-def crease_lines(patch: Patch, sharpest: float | None = None, options: CreaseOptions = CreaseOptions()) -> Passes:
-    """Return the concave edges of a patch as lines: where a ball touches two sides of a corner.
+def crease_lines(
+    patch: Patch,
+    sharpest: float | None = None,
+    also: Bools | None = None,
+    options: CreaseOptions = CreaseOptions(),
+) -> Passes:
+    """Return the concave edges of a patch as lines: where a cutter touches two sides of a corner.
 
-    sharpest: in place of the options'.
+    sharpest: in place of the options'. also (E,): further edges.
     """
     chosen = sharp_edges(patch, options.sharpest if sharpest is None else sharpest, concave=True)
+    chosen = chosen if also is None else chosen | also
     edges = patch.topology.edges
     lines: list[Line] = []
     normals = np.zeros_like(patch.vertices)

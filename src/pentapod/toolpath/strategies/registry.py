@@ -25,6 +25,7 @@ from pentapod.toolpath.surface import Surface
 from pentapod.toolpath.surfaces.drive_surface import DriveSurface
 from pentapod.toolpath.surfaces.part_surface import PartSurface
 from pentapod.toolpath.surfaces.places import DriveOptions
+from pentapod.toolpath.surfaces.rolled_surface import RolledSurface
 from pentapod.toolpath.surfaces.tip_surface import TipSurface
 from pentapod.toolpath.toolpath import Toolpath
 
@@ -106,18 +107,18 @@ def surface_for(mesh: Mesh, tool: Tool, options: PathOptions, axis: Floats | Non
 def with_fills(surface: Surface, paths: ContactPaths, options: PathOptions) -> ContactPaths:
     """Return the paths with lines along concave corners between passes, and over what is left by all these.
 
-    If the strategy fills gaps and a ball rolls. What a pass beside a corner leaves in it is much higher than the ridge
-    between passes.
+    If the strategy fills gaps and a cutter rolls. What a pass beside a corner leaves in it is much higher than the ridge
+    between passes. What is left by all these is known for balls alone.
     """
-    if not (surface.slides and isinstance(options, CoverOptions) and options.fill):
+    if not (isinstance(surface, RolledSurface) and isinstance(options, CoverOptions) and options.fill):
         return paths
     patch = surface.patch(options.region)
-    creases = uncrossed(crease_lines(patch), paths.passes, paths.stepover, surface.radius)
+    creases = uncrossed(crease_lines(patch, also=surface.feet(patch)), paths.passes, paths.stepover, surface.radius)
     passes = Passes.joined([paths.passes, creases])
     hides = partial(surface.hides, slack=options.chordal)
-    if surface.turns is False:
-        return replace(paths, passes=passes) if len(creases) else paths
-    rest = rest_lines(patch, passes, surface.radius, paths.stepover, hides, options.shortest)
+    rest = Passes.of([])
+    if isinstance(surface, DriveSurface):
+        rest = rest_lines(patch, passes, surface.radius, paths.stepover, hides, options.shortest)
     return replace(paths, passes=Passes.joined([passes, rest])) if len(creases) + len(rest) else paths
 
 

@@ -73,6 +73,10 @@ class RolledSurface(ABC):
     def _seen(self, ways: list[Floats | None], slack: float) -> list[Floats | None]:
         """Return ways (n, 3) of the cutter, None for those on which the part lies above."""
 
+    def feet(self, patch: Patch) -> Bools:
+        """Return which edges (E,) of a patch are borders along which a pass must run: none for a ball."""
+        return np.zeros(len(patch.topology.edges), dtype=np.bool_)
+
     @property
     def radius(self) -> float:
         """Radius of the cutter, metres."""

@@ -83,10 +83,8 @@ class TipSurface(RolledSurface):
 
         The tip stays above the lowest point of the part. Around an open border the cutter does not roll.
         """
-        axis = self.tips.axis
-        lowest = float((self.part.vertices @ axis).min())
         patch = Patch.whole(self.mesh)
-        patch, _ = patch.above(patch.vertices @ axis, lowest - self.options.on_level * self.radius)
+        patch, _ = patch.above(patch.vertices @ self.tips.axis, self._lowest)
         if region.box is not None:
             for bound, side in zip(region.bounds, (1.0, -1.0), strict=True):
                 for k in range(3):
@@ -94,6 +92,16 @@ class TipSurface(RolledSurface):
                     patch, _ = patch.above(side * (contacts[:, k] - bound[k]), 0.0)
         patch = patch.where_normals(partial(region.faces, default=0.5 * np.pi))
         return patch if self.part.topology.watertight else patch.above(-self._beyond_border(patch), 0.0)[0]
+
+    @property
+    def _lowest(self) -> float:
+        """Height along the axis, metres, to which the surface reaches down."""
+        return float((self.part.vertices @ self.tips.axis).min()) - self.options.on_level * self.radius
+
+    def feet(self, patch: Patch) -> Bools:
+        """Return which edges (E,) of a patch are the lowest of walls: the end cuts above its tip alone."""
+        low = patch.vertices @ self.tips.axis < self._lowest + self.options.on_level * self.radius
+        return low[patch.topology.edges].all(axis=1) & (patch.topology.facets_at_edge == 1)
 
     def waypoints(self, passes: Passes, options: PathOptions) -> Passes:
         """Return tips for lines on the surface, put exactly on it, and the axis."""
