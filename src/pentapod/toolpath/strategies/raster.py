@@ -18,7 +18,7 @@ from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.slicing import LevelSet
-from pentapod.toolpath.lines.gap_filling import GapOptions, gap_lines, lines_as_sources
+from pentapod.toolpath.lines.gap_filling import FRONTS, GapOptions, gap_lines, lines_as_sources
 from pentapod.toolpath.lines.scallop import level_values
 from pentapod.toolpath.lines.steep_areas import steep_facets
 from pentapod.toolpath.options import CoverOptions
@@ -132,14 +132,21 @@ def plane_lines(surface: Surface, patch: Patch, options: CoverOptions, across: F
 def _gaps(
     surface: Surface, whole: Patch, steps: Floats, options: CoverOptions, across: Floats, levels: Floats
 ) -> Passes:
-    """Return lines that fill the gaps between planes at levels (L,). Gaps can only be near borders and creases."""
-    gaps = GapOptions()
-    patch, near = whole.rim(1.25 * float(steps.max()), gaps.longest_edge(steps))
+    """Return lines that fill the gaps between planes at levels (L,).
+
+    For a ball gaps are filled near borders and creases, and the rest of walls along the planes by `rest_lines`; for ends
+    all gaps are filled here.
+    """
+    gaps, wanted = GapOptions(), None
+    if surface.turns:
+        patch, wanted = whole.rim(1.25 * float(steps.max()), gaps.longest_edge(steps))
+    else:
+        patch, gaps = whole.refined(gaps.longest_edge(steps)), replace(gaps, negligible=FRONTS.negligible)
     if not len(patch.faces):
         return Passes.of([])
     steps = surface.steps(patch, across, options)
     sources = lines_as_sources(LevelSet(patch, patch.vertices @ across, levels), steps)
-    return gap_lines(patch, sources, steps, gaps, where=near, area=float(whole.areas.sum()))
+    return gap_lines(patch, sources, steps, gaps, where=wanted, area=float(whole.areas.sum()))
 
 
 def _monotone(passes: Passes, view: Floats, *, upwards: bool, least: float) -> Passes:
