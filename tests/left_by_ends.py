@@ -1,4 +1,4 @@
-"""What a toolpath of a bull-nose or flat end with the axis +z leaves on a part and cuts too deep, measured by OpenCAMLib.
+"""What a toolpath of a bull-nose or flat end with axis +z leaves and what it cuts too deep, by OpenCAMLib.
 
 The limit of what the cutter can reach is where OpenCAMLib's drop cutter lets it rest, and all above, down to the lowest
 point of the part. What is left at a point of the part is its distance from the cutter's nearest position. A cutter that
@@ -40,7 +40,7 @@ def rest_heights(part: Mesh, places, radius: float, corner: float):
 
 
 class ReachableTips:
-    """The lowest tips of an end that comes from above, about `pitch` metres apart, upright columns at jumps among them."""
+    """The lowest tips of an end from above, about `pitch` metres apart, upright columns at jumps among them."""
 
     def __init__(self, part: Mesh, tool: BullNose, pitch: float = 2e-4) -> None:
         self.part, self.tool, self.pitch = part, tool, pitch
@@ -79,7 +79,7 @@ class ReachableTips:
         return [*made, column]
 
     def samples(self, count: int, steepest_deg: float = 90.0, seed: int = 2):
-        """Points (N, 3) spread evenly over what is seen from above, walls too, but for what is lowest on the outside."""
+        """Points (N, 3) spread evenly over what is seen from above, walls too, not what is lowest on the outside."""
         rng, part = np.random.default_rng(seed), self.part
         wanted = part.facet_normals[:, 2] >= np.cos(np.radians(steepest_deg)) - 1e-9
         area = part.facet_areas * wanted

@@ -134,8 +134,8 @@ def _gaps(
 ) -> Passes:
     """Return lines that fill the gaps between planes at levels (L,).
 
-    For a ball gaps are filled near borders and creases, and the rest of walls along the planes by `rest_lines`; for ends
-    all gaps are filled here.
+    For a ball gaps are filled near borders and creases, and the rest of walls along the planes by `rest_lines`; for
+    ends all gaps are filled here.
     """
     gaps, wanted = GapOptions(), None
     if surface.turns:

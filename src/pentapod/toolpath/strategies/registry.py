@@ -107,8 +107,8 @@ def surface_for(mesh: Mesh, tool: Tool, options: PathOptions, axis: Floats | Non
 def with_fills(surface: Surface, paths: ContactPaths, options: PathOptions) -> ContactPaths:
     """Return the paths with lines along concave corners between passes, and over what is left by all these.
 
-    If the strategy fills gaps and a cutter rolls. What a pass beside a corner leaves in it is much higher than the ridge
-    between passes. What is left by all these is known for balls alone.
+    If the strategy fills gaps and a cutter rolls. What a pass beside a corner leaves in it is much higher than the
+    ridge between passes. What is left by all these is known for balls alone.
     """
     if not (isinstance(surface, RolledSurface) and isinstance(options, CoverOptions) and options.fill):
         return paths

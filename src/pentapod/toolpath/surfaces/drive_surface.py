@@ -95,22 +95,12 @@ class DriveSurface(RolledSurface):
                 hidden[hidden] = self.field.topmost(points[hidden] + aside)[2] > height[hidden]
         return hidden
 
-    def patch(self, region: Region) -> Patch:
+    def _patch(self, region: Region) -> Patch:
         """Return the part of the drive surface from which the ball touches a region; empty where there is none.
 
         A region that reaches a right angle reaches a little further, so that rounding does not split walls. Around an
         open border the ball does not roll.
         """
-        if id(region) not in self._patches:
-            self._patches[id(region)] = region, self._patch(region)
-        return self._patches[id(region)][1]
-
-    @cached_property
-    def _patches(self) -> dict[int, tuple[Region, Patch]]:
-        """Patches that are known: strategies, fills and links ask for the same one. Regions are kept for their ids."""
-        return {}
-
-    def _patch(self, region: Region) -> Patch:
         patch = Patch.whole(self.mesh)
         if region.box is not None:
             for bound, side in zip(region.bounds, (1.0, -1.0), strict=True):

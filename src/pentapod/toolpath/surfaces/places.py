@@ -31,8 +31,9 @@ class DriveOptions(Value):
     as shares of the radius: walls, and valleys between steep flanks, do not hide themselves, nor do walls that lean
     under by less. under: the same as `sideways` for links, which may lead a little farther; upright: and for those
     between ends over which nothing leans. evened: how often the stepover for a scallop is averaged with that of
-    neighbouring facets, whose curvature is noisy. reach, aside: how far a place of the tip is moved onto its surface
-    from near it, and sideways on a link, as shares of the radius.
+    neighbouring facets, whose curvature is noisy. about: how far beyond what the ball touches in a region's
+    box the surface is made, as a multiple of the radius: links may lead there. reach, aside: how far a place of the tip
+    is moved onto its surface from near it, and sideways on a link, as shares of the radius.
     """
 
     step: float = 0.25
@@ -53,6 +54,7 @@ class DriveOptions(Value):
     upright: float = 0.01
     above: float = 0.2
     evened: int = 2
+    about: float = 3.0
     reach: float = 0.25
     aside: float = 0.5
 

@@ -54,7 +54,7 @@ class RolledSurface(ABC):
         """Return whether the surface lies above points (N, 3) on it by more than `slack` metres."""
 
     @abstractmethod
-    def patch(self, region: Region) -> Patch:
+    def _patch(self, region: Region) -> Patch:
         """Return the part of the surface from which the cutter touches a region; empty where there is none."""
 
     @abstractmethod
@@ -96,6 +96,17 @@ class RolledSurface(ABC):
     def part_field(self) -> HeightField:
         """Ray casting onto the part along the view."""
         return HeightField(self.part, self.view)
+
+    def patch(self, region: Region) -> Patch:
+        """Return the part of the surface from which the cutter touches a region; empty where there is none."""
+        if id(region) not in self._patches:
+            self._patches[id(region)] = region, self._patch(region)
+        return self._patches[id(region)][1]
+
+    @cached_property
+    def _patches(self) -> dict[int, tuple[Region, Patch]]:
+        """Patches that are known: strategies, fills and links ask for the same one. Regions are kept for their ids."""
+        return {}
 
     def steps(self, patch: Patch, across: Floats, options: CoverOptions) -> Floats:
         """Return the stepover (F,) on each facet, along the drive surface. Raises ToolpathError as `surface_steps`."""

@@ -78,7 +78,7 @@ class TipSurface(RolledSurface):
         del slack
         return np.zeros(len(points), dtype=np.bool_)
 
-    def patch(self, region: Region) -> Patch:
+    def _patch(self, region: Region) -> Patch:
         """Return the part of the surface from which the cutter touches a region; empty where there is none.
 
         The tip stays above the lowest point of the part. Around an open border the cutter does not roll.
