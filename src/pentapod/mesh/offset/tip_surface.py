@@ -124,8 +124,15 @@ class Lowered:
             cross_tips(starts, axes, lengths, _HALVINGS, self.radius, self.disc, *self._hierarchy, points, sides)
             points[:, 2] -= self.radius
             found.append((keys, axes, out, points, sides))
-        keys, axes, out, points, sides = (np.concatenate([each[k] for each in found]) for k in range(5))
-        return Crossings(keys, axes, np.ones(len(keys), dtype=np.intp), out, points, sides)
+        keys = np.concatenate([each[0] for each in found])
+        return Crossings(
+            keys,
+            np.concatenate([each[1] for each in found]),
+            np.ones(len(keys), dtype=np.intp),
+            np.concatenate([each[2] for each in found]),
+            np.concatenate([each[3] for each in found]),
+            np.concatenate([each[4] for each in found]),
+        )
 
     def _raised(self, tips: Floats) -> Floats:
         """Return the middles (N, 3) of the disc for tips (N, 3)."""

@@ -44,7 +44,7 @@ class TipPlaces(Places):
     def _settled(self, local: Floats, towards: Floats, reach: float) -> tuple[Floats, Bools]:
         """Return `settled` of points and directions in the tool's frame. reach: in radii of the cutter."""
         ways = unit_or_zero(towards)
-        ways = np.where(ways.any(axis=1)[:, None], ways, UP)
+        ways = np.where(np.any(ways != 0.0, axis=1, keepdims=True), ways, UP)
         off = self.options.on_level * self.radius
         points, held = self.lowered.settled(local, ways, reach * self.radius, off)
         return points @ self.frame, held
@@ -79,7 +79,7 @@ class TipPlaces(Places):
     def near(self, points: Floats, towards: Floats, chordal: float) -> Bools:
         """Return which points (N, 3) are at most `chordal` metres off the surface, along the normals `towards`."""
         ways = unit_or_zero(towards)
-        ways = np.where(ways.any(axis=1)[:, None], ways, self.axis)
+        ways = np.where(np.any(ways != 0.0, axis=1, keepdims=True), ways, self.axis)
         return self.lowered.meets((points - chordal * ways) @ self.frame.T)
 
     def normals(self, points: Floats) -> Floats:
