@@ -80,7 +80,26 @@ def derivatives(solid: Floats, motion: Floats, pose: Floats, x: float, y: float,
     g[1] = scale * ry + by_z * j
     g[2] = scale * rz + by_z * k
     g[VALUE] = f
-    # The body moves with velocity V + ω × w at the point; in its frame the point moves the opposite way.
+    _point_moves(motion, wx, wy, wz, g)
+
+
+@kernel
+def above_base(solid: Floats, motion: Floats, pose: Floats, x: float, y: float, z: float, g: Floats) -> None:
+    """Write into g (6,), as `derivatives`, the height of a mesh point below the plane that the solid stands on.
+
+    The solid lies on one side of that plane, so that this is a lower bound of f. On a floor that a flat end touches it
+    is 0 throughout, where tangent planes beside the rim say nothing.
+    """
+    wx, wy, wz = x - pose[0], y - pose[1], z - pose[2]
+    for c in range(3):
+        g[c] = -pose[AXIS + c]
+    g[VALUE] = solid[0] - solid[4] - motion[17] + g[0] * wx + g[1] * wy + g[2] * wz
+    _point_moves(motion, wx, wy, wz, g)
+
+
+@kernel
+def _point_moves(motion: Floats, wx: float, wy: float, wz: float, g: Floats) -> None:
+    """Write ∂f/∂t and W into g (6,): the body moves with velocity V + ω × w, in its frame the point the other way."""
     vx = motion[6] + motion[13] * wz - motion[14] * wy
     vy = motion[7] + motion[14] * wx - motion[12] * wz
     vz = motion[8] + motion[12] * wy - motion[13] * wx

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.mesh.query.body_kernels import VALUE, derivatives, deviation_bound, pose_at
+from pentapod.mesh.query.body_kernels import VALUE, above_base, derivatives, deviation_bound, pose_at
 from pentapod.numerics.kernels import kernel
 
 STACK = 512
@@ -18,6 +18,20 @@ WORK = 21
 
 RELATIVE_ERROR = 1e-2
 """Share of a depth that may be missed, besides `eps`."""
+
+
+@kernel
+def _above_piece(solid: Floats, motion: Floats, pose: Floats, piece: Floats, tau: float, g: Floats) -> float:
+    """Return the lower bound of f that the plane gives on which the solid stands; piece: corners first; g: a buffer."""
+    lowest, size = np.inf, 0.0
+    for p in (1, 2, 0):
+        above_base(solid, motion, pose, piece[3 * p], piece[3 * p + 1], piece[3 * p + 2], g)
+        lowest = min(lowest, g[VALUE])
+        size = max(
+            size,
+            (piece[3 * p] - piece[0]) ** 2 + (piece[3 * p + 1] - piece[1]) ** 2 + (piece[3 * p + 2] - piece[2]) ** 2,
+        )
+    return lowest - deviation_bound(motion, g, tau, math.sqrt(size))
 
 
 @kernel
@@ -35,7 +49,7 @@ def _deepest_in_motion(
     g: Floats,
 ) -> bool:
     """Lower best (5,): f, time and point, within one facet (3, 3) and the times s ± tau; return whether it did."""
-    found = False
+    found, base = False, np.empty(6)
     for k in range(9):
         work[0, k] = corners[k // 3, k % 3]
     work[0, 9], work[0, 10] = s, tau
@@ -58,7 +72,9 @@ def _deepest_in_motion(
             lowest = min(lowest, g[0] * dx + g[1] * dy + g[2] * dz)
             size = max(size, dx * dx + dy * dy + dz * dz)
         deviation = deviation_bound(motion, g, tau, math.sqrt(size))
-        if g[VALUE] + lowest - deviation >= best[0] - eps + RELATIVE_ERROR * min(best[0], 0.0) or count + 2 > STACK:
+        if g[VALUE] + lowest - deviation >= _threshold(best, eps) or count + 2 > STACK:
+            continue
+        if _above_piece(solid, motion, pose, work[count], tau, base) >= _threshold(best, eps):
             continue
         if deviation > -lowest:
             for half in range(2):

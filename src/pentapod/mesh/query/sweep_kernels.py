@@ -7,9 +7,9 @@ with centre c and offsets δ, and over the times s ± τ,
     f ≥ f(c, s) + min g·δ − |∂f/∂t| τ − ½ τ² (θ² W + 2 θ V) − θ τ max|δ|
 
 with θ the angle that the axis turns, V the distance that the tilt centre moves, and W the distance of the point from
-the tilt centre: the last two terms bound the deviation of the motion, in the body's frame, from a straight line. Boxes
-and triangles that cannot contain a deeper point than the best known are dropped; the others are halved in space or in
-time, whichever makes the bound worse.
+the tilt centre: the last two terms bound the deviation of the motion, in the body's frame, from a straight line. The
+body stands on a plane, whose distance bounds f likewise. Boxes and triangles that cannot contain a deeper point than
+the best known are dropped; the others are halved in space or in time, whichever makes the bound worse.
 """
 
 from __future__ import annotations
@@ -17,10 +17,20 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.mesh.query.body_kernels import VALUE, derivatives, deviation_bound, pose_at
+from pentapod.mesh.query.body_kernels import VALUE, above_base, derivatives, deviation_bound, pose_at
 from pentapod.mesh.query.box_kernels import box_radius
 from pentapod.mesh.query.facet_kernels import RELATIVE_ERROR, STACK, WORK, deepest_in_facet
 from pentapod.numerics.kernels import kernel
+
+
+@kernel
+def _above_box(solid: Floats, motion: Floats, pose: Floats, box: Floats, tau: float, g: Floats) -> float:
+    """Return the lower bound of f over a box and times that the plane gives on which the solid stands; g: a buffer."""
+    above_base(solid, motion, pose, box[0], box[1], box[2], g)
+    fall = 0.0
+    for k in range(3):
+        fall += box[3 + k] * abs(g[0] * box[6 + 3 * k] + g[1] * box[7 + 3 * k] + g[2] * box[8 + 3 * k])
+    return g[VALUE] - fall - deviation_bound(motion, g, tau, box_radius(box))
 
 
 @kernel
@@ -43,7 +53,7 @@ def deepest(
     tilt centre above the tip. best[0] on entry is the threshold: only deeper points are searched. nodes, work: buffers.
     enough: the search ends at a point this deep.
     """
-    pose, g = np.empty(6), np.empty(6)
+    pose, g, base = np.empty(6), np.empty(6), np.empty(6)
     leaves = len(starts) - 1
     facet = -1
     nodes[0, 0], nodes[0, 1], nodes[0, 2] = 0.0, 0.5, 0.5 if motion[15] > 0.0 or motion[16] > 0.0 else 0.0
@@ -58,7 +68,12 @@ def deepest(
         for k in range(3):
             fall += box[3 + k] * abs(g[0] * box[6 + 3 * k] + g[1] * box[7 + 3 * k] + g[2] * box[8 + 3 * k])
         deviation = deviation_bound(motion, g, tau, box_radius(box))
-        if g[VALUE] - fall - deviation >= best[0] - eps + RELATIVE_ERROR * min(best[0], 0.0) or count + 2 > STACK:
+        least = best[0] - eps + RELATIVE_ERROR * min(best[0], 0.0)
+        if (
+            g[VALUE] - fall - deviation >= least
+            or count + 2 > STACK
+            or (_above_box(solid, motion, pose, box, tau, base) >= least)
+        ):
             continue
         leaf = node - (leaves - 1)
         if leaf < 0 and deviation <= fall:
