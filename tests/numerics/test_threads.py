@@ -30,6 +30,17 @@ def test_several_work_at_once_and_no_more_than_are_asked_for():
     results.close()
 
 
+def test_one_item_takes_no_other_thread_and_more_may_be_begun_ahead():
+    assert list(in_threads(lambda _: threading.current_thread(), [0], 2)) == [threading.current_thread()]
+    rest_is_done = threading.Event()
+    # The first ends when all others have: that needs them begun before its result is asked for.
+    results = in_threads(
+        lambda k: rest_is_done.wait(10.0) if k == 0 else rest_is_done.set() if k == 5 else None, range(6), 2, ahead=6
+    )
+    assert next(results) is True
+    results.close()
+
+
 def test_an_error_comes_where_its_result_would():
     results = in_threads(lambda k: 1 // (3 - k), range(10), 2)
     assert [next(results) for _ in range(3)] == [0, 0, 1]

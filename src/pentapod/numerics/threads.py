@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sized
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextvars import copy_context
 from functools import wraps
@@ -34,15 +34,17 @@ def cores() -> int:
 
 
 def in_threads(
-    function: Callable[[_Item], _Result], items: Iterable[_Item], threads: int | None = None
+    function: Callable[[_Item], _Result], items: Iterable[_Item], threads: int | None = None, ahead: int | None = None
 ) -> Iterator[_Result]:
     """Yield function(item) for all items, in their order; the same results for any number of threads.
 
-    threads: by default one for each core; with 1 all is done in this one. No more items are begun than threads are
-    ahead of the result that is asked for, so that few results are held.
+    threads: by default one for each core; with 1 all is done in this one. ahead: how many items are begun ahead of the
+    result that is asked for; by default as many as threads, so that few results are held.
     """
     count = threads or cores()
-    if count == 1:
+    if isinstance(items, Sized):
+        count = min(count, len(items))
+    if count <= 1:
         yield from map(function, items)
         return
     with ThreadPoolExecutor(count) as pool:
@@ -50,7 +52,7 @@ def in_threads(
         try:
             for item in items:
                 begun.append(pool.submit(copy_context().run, function, item))
-                if len(begun) > count:
+                if len(begun) > (count if ahead is None else ahead):
                     yield begun.popleft().result()
             while begun:
                 yield begun.popleft().result()

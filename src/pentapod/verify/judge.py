@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -34,7 +34,7 @@ from pentapod.verify.claims import (
     stops_and_dwells,
     tool_motion,
 )
-from pentapod.verify.replay.claim import Claim
+from pentapod.verify.replay.claim import Claim, Idle
 from pentapod.verify.replay.replay import REPLAY_SHARE, Replay
 from pentapod.verify.surface import surface_left
 from pentapod.verify.verdict.specification import Asked, Specification
@@ -128,11 +128,13 @@ def judged(
     replay, unjudged = Replay(program, specification, progress), list[NotJudged]()
     _ = replay.interval_bounds  # first, because its progress is the first share
     around = collisions.claims(specification.collision_world, len(specification.machine.bars.names))
-    own = (*CLAIMS, *around)
-    answers = chain(in_threads(lambda claim: claim(replay), own), (claim(replay) for claim in claims))
-    claims = (*own, *claims)
-    for k, (claim, answer) in enumerate(zip(claims, answers, strict=True)):
-        progress("verify", REPLAY_SHARE + (1.0 - REPLAY_SHARE) * k / len(claims), claim.name)
+    own, found = (*reversed(around), *CLAIMS), dict[Claim, Certificate | Idle]()  # those that take longest begin
+    answers = chain(_answers(replay, own), (claim(replay) for claim in claims))
+    for k, (claim, answer) in enumerate(zip((*own, *claims), answers, strict=True)):
+        progress("verify", REPLAY_SHARE + (1.0 - REPLAY_SHARE) * k / (len(own) + len(claims)), claim.name)
+        found[claim] = answer
+    for claim in (*CLAIMS, *around, *claims):
+        answer = found[claim]
         if isinstance(answer, Certificate):
             read.append(answer)
         elif answer.unknown:
@@ -141,6 +143,21 @@ def judged(
             read.append(claim.inapplicable(answer))
     progress("verify", 1.0)
     return Verdict(tuple(read), tuple(unjudged), sources)
+
+
+def _answers(replay: Replay, claims: Sequence[Claim]) -> Iterator[Certificate | Idle]:
+    """Yield the answers of claims in their order, on all cores, the matching with the toolpath beside the first.
+
+    Nearly all claims name their places by it, so that they would wait for each other.
+    """
+
+    def answer(claim: Claim | None) -> Certificate | Idle | None:
+        if claim is not None:
+            return claim(replay)
+        _ = replay.match if not len(replay.unposed) else None
+        return None
+
+    return (found for found in in_threads(answer, (None, *claims), ahead=len(claims)) if found is not None)
 
 
 def _certificate(claim: str, passed: bool, method: str) -> Certificate:

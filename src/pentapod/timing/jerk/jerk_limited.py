@@ -7,9 +7,9 @@ answer keeps the true limits, and the next one starts from it and can only impro
 At rest √x has no derivative. The law leaves rest with constant jerk, x = c s^(4/3), and joins the spline after a
 small part of the ramp, with the ramp's speed and acceleration.
 
-Long profiles are solved in blocks that overlap; beyond their cuts they are free. About a cut both blocks have a law,
-and the law passes from one to the other where they agree best, by a fraction with two vanishing derivatives. Where they
-agree nowhere, or one has no law, the overlap is doubled.
+Long profiles are solved in blocks that overlap, on all cores; beyond their cuts they are free. About a cut both blocks
+have a law, and the law passes from one to the other where they agree best, by a fraction with two vanishing
+derivatives. Where they agree nowhere, or one has no law, the overlap is doubled.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from itertools import pairwise
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.numerics.threads import in_threads
 from pentapod.timing.jerk.interval import Interval
 from pentapod.timing.jerk.options import DEFAULTS, JerkOptions
 from pentapod.timing.jerk.passes import fastest_law
@@ -156,7 +157,7 @@ def jerk_limited(problem: JerkProblem) -> JerkProfile | Failure:
     """Return the fastest jerk-limited profile, with the first overlap at which all blocks have a law and agree."""
     reason = NO_AGREEMENT
     for overlap in problem.overlaps():
-        found = [problem.solved(block) for block in problem.blocks(overlap)]
+        found = list(in_threads(problem.solved, problem.blocks(overlap)))
         laws = [law for law in found if isinstance(law, BlockLaw)]
         nodes = problem.joined(overlap, laws) if len(laws) == len(found) else None
         if nodes is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.numerics.threads import in_threads
 from pentapod.timing.jerk.jerk_limited import JerkProblem, JerkProfile, jerk_limited
 from pentapod.timing.jerk.options import JerkOptions
 from pentapod.timing.jerk.rows import JerkRows, MeasureExcess
@@ -39,7 +40,7 @@ def jerk_limited_profile(profile: PieceProfile, measure: MeasureExcess, options:
     if len(capped):
         s = _fine_grid(profile)
         x = np.interp(s, profile.s, profile.x)
-        found = [capped_rows(PathDerivatives(profile.piece, s[part])) for part in parts(len(s) - 1)]
+        found = in_threads(lambda part: capped_rows(PathDerivatives(profile.piece, s[part])), parts(len(s) - 1))
         first, second, offset, ceiling = (
             _overlapping(column)
             for column in zip(*((y.first, y.second, y.offset, top) for y, top in found), strict=True)
