@@ -12,7 +12,7 @@ class PathReport(Value):
     """Lengths, counts and problems of a toolpath. Lengths in metres.
 
     stepover: largest distance between passes along the surface; 0 for lines that do not cover it. stay_downs: links on
-    the surface; hops: rapids just above the part; retracts: passes reached by way of the clearance level, with the
+    the surface; hops: rapids just above the part; retracts: passes reached by a rapid at the clearance height, with the
     first. travel: total distance between the end of each pass and the start of the next; travel_bound: lower bound of
     it for any order. dropped: passes shorter than `PathOptions.shortest`; dropped_length: their total length. hidden:
     waypoints left out because the part lies above them. tight: waypoints where the concave radius of the surface along
@@ -41,7 +41,7 @@ class PathReport(Value):
         text = (
             f"{self.strategy}: {self.passes:,} passes{stepover}, {self.cut_length:.4g} m of cut, "
             f"{self.waypoints:,} waypoints; {self.stay_downs:,} links on the surface, {self.hops:,} hops, "
-            f"{self.retracts:,} by way of the clearance level"
+            f"{self.retracts:,} rapids at the clearance height"
         )
         for note in self.notes:
             text += f"\n  note: {note}"

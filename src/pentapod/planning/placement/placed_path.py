@@ -21,7 +21,7 @@ from pentapod.toolpath.toolpath import Toolpath
 
 @dataclass(frozen=True)
 class Placement(Value):
-    """Rigid transform workpiece → machine, and the reason for its choice ("job", "largest smallest margin", ...).
+    """Rigid transform workpiece → machine, and the reason for its choice ("job", "the one with the most room ...").
 
     rail_positions (n,): of a reconfigurable machine, metres; None for other machines.
     """

@@ -94,7 +94,7 @@ class Search:
     @property
     def choice(self) -> str:
         """The reason for the choice of the placement, in words."""
-        poses, aim = self.constraints.poses, "largest smallest margin"
+        poses, aim = self.constraints.poses, "the one with the most room to the limits"
         if len(poses) > 1:
             aim = f"pose {1 + poses.index(self.best.transform)} of {len(poses)} of the fixture: {aim}"
         if self.interrupted:
