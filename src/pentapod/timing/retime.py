@@ -95,7 +95,7 @@ def retime(
         speeds = (start_speed if k == indices[0] else 0.0, end_speed if k == indices[-1] else 0.0)
         return time_piece(path.pieces[k], kept, *slacks, engine, speeds)
 
-    for k, profile in zip(indices, in_threads(profile_of, indices), strict=True):
+    for k, profile in zip(indices, in_threads(profile_of, indices, ahead=len(indices)), strict=True):
         if isinstance(profile, Failure):
             return refusal(path, k, profile)
         profiles.append(profile)

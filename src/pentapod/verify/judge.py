@@ -128,13 +128,14 @@ def judged(
     replay, unjudged = Replay(program, specification, progress), list[NotJudged]()
     _ = replay.interval_bounds  # first, because its progress is the first share
     around = collisions.claims(specification.collision_world, len(specification.machine.bars.names))
-    own, found = (*reversed(around), *CLAIMS), dict[Claim, Certificate | Idle]()  # those that take longest begin
-    answers = chain(_answers(replay, own), (claim(replay) for claim in claims))
+    own = (*reversed(around), *CLAIMS)  # those that take longest are begun first
+    answers, found = chain(_answers(replay, own), (claim(replay) for claim in claims)), list[Certificate | Idle]()
     for k, (claim, answer) in enumerate(zip((*own, *claims), answers, strict=True)):
         progress("verify", REPLAY_SHARE + (1.0 - REPLAY_SHARE) * k / (len(own) + len(claims)), claim.name)
-        found[claim] = answer
-    for claim in (*CLAIMS, *around, *claims):
-        answer = found[claim]
+        found.append(answer)
+    first, last = len(around), len(own)
+    found = [*found[first:last], *reversed(found[:first]), *found[last:]]
+    for claim, answer in zip((*CLAIMS, *around, *claims), found, strict=True):
         if isinstance(answer, Certificate):
             read.append(answer)
         elif answer.unknown:

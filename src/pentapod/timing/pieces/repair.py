@@ -134,7 +134,7 @@ def repaired_laws(
         return timed(k, _planned(profiles[k], machine, jerk_options, options))
 
     current: list[tuple[_Plan, Setpoints]] = []
-    for k, found in enumerate(in_threads(first, range(len(profiles)))):
+    for k, found in enumerate(in_threads(first, range(len(profiles)), ahead=len(profiles))):
         if isinstance(found, Failure):
             return NotRepaired(k, found)
         current.append(found)
