@@ -13,8 +13,6 @@ from contextvars import copy_context
 from functools import wraps
 from typing import ParamSpec, TypeVar
 
-from pentapod.numerics.blocks import BLOCK, blocks
-
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 _P = ParamSpec("_P")
@@ -59,15 +57,6 @@ def in_threads(
         finally:
             for future in begun:
                 future.cancel()
-
-
-def in_blocks_on_cores(work: Callable[[slice], None], count: int) -> None:
-    """Do a kernel's work on range(count), block by block, on all cores; blocks are the same for any number of them."""
-    if count <= BLOCK:
-        work(slice(0, count))
-        return
-    for _ in in_threads(work, blocks(count)):
-        pass
 
 
 def on_one_thread(function: Callable[_P, _R]) -> Callable[_P, _R]:

@@ -1,74 +1,59 @@
-"""Where a level set of the distance from a mesh crosses straight lines, compiled.
-
-The distance from one facet is convex along a line: between a place where it is above the level and one where it is not
-it crosses the level once, and Newton's steps from above lead there without going past. The distance from the mesh is
-that from its nearest facet: where another one is nearer at such a crossing, its own crossing lies between the place
-above and there.
-"""
+"""Where a level set of the distance from a mesh crosses straight lines, compiled."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, Ints
-from pentapod.mesh.query.ball_kernels import facet_distance
+from pentapod.base.arrays import Floats, Ints
 from pentapod.mesh.query.segment_kernels import STACK, closest
 from pentapod.numerics.kernels import kernel
 
 _ROUNDS = 60
+_ILLINOIS = 40
 _EXACT = 1e-6
 """Of the distance: how near to the level a crossing is."""
 
 
 @kernel
-def _crossing(facet: Floats, p: Floats, axis: int, low: float, high: float, level: float, g: Floats) -> float:
-    """Return where between low and high along an axis the distance of p (3,) from a facet is `level`, p moved there.
-
-    At high it is above the level, at low it is not; high may be below low. g (3,): room.
-    """
-    x = high
-    for _ in range(_ROUNDS):
-        p[axis] = x
-        distance = facet_distance(facet, p[0], p[1], p[2], g)
-        over = distance - level
-        if over < 0.1 * _EXACT * level:
-            break
-        x -= over * distance / g[axis]
-        if not min(low, high) <= x <= max(low, high):  # rounding errors alone lead there
-            x = low
-    p[axis] = x
-    return x
-
-
-@kernel
 def cross_level(
-    starts: Floats, axes: Ints, lengths: Floats, outward: Bools, level: float, corners: Floats, leaf_starts: Ints,
-    extents: Floats, points: Floats, normals: Floats,
+    starts: Floats, axes: Ints, lengths: Floats, level: float, corners: Floats, leaf_starts: Ints, extents: Floats,
+    points: Floats, normals: Floats,
 ) -> None:  # fmt: skip
     """Fill where (E, 3) the distance from the mesh is `level` on edges from starts (E, 3), and its gradient there.
 
-    axes (E,): along which the edges run. lengths (E,): of the edges, metres. outward (E,): whether the distance is
-    above the level at the start and not at the other end, or the other way round.
+    axes (E,): along which the edges run. lengths (E,): of the edges, metres. At one end the distance is above the
+    level, at the other not. Regula falsi with the Illinois rule; bisection where that does not end.
     Where two facets are as near, no edge depends on the others: none begins with a facet of the one before.
     """
     nodes, bounds, away = np.empty(STACK, dtype=np.intp), np.empty(STACK), np.zeros(6)
-    p, g = np.empty(3), np.empty(3)
+    p = np.empty(3)
     for m in range(len(starts)):
-        axis = axes[m]
+        axis, low, high, side, facet = axes[m], 0.0, lengths[m], 0, -1
         p[:] = starts[m]
-        high = p[axis] if outward[m] else p[axis] + lengths[m]
-        low = p[axis] + lengths[m] if outward[m] else p[axis]
-        p[axis] = low
-        distance, facet = closest(p[0], p[1], p[2], math.inf, -1, corners, leaf_starts, extents, nodes, bounds, away)
-        for _ in range(_ROUNDS):
-            if abs(distance - level) < _EXACT * level:
-                break
-            low = _crossing(corners[facet], p, axis, low, high, level, g)
+        distance, facet = closest(p[0], p[1], p[2], np.inf, facet, corners, leaf_starts, extents, nodes, bounds, away)
+        at_low = distance - level
+        p[axis] = starts[m, axis] + lengths[m]
+        distance, facet = closest(p[0], p[1], p[2], np.inf, facet, corners, leaf_starts, extents, nodes, bounds, away)
+        at_high = distance - level
+        for number in range(_ROUNDS):
+            x = 0.5 * (low + high)
+            if number < _ILLINOIS and at_low != at_high:
+                x = min(max((at_low * high - at_high * low) / (at_low - at_high), low), high)
+            p[axis] = starts[m, axis] + x
             distance, facet = closest(
-                p[0], p[1], p[2], math.inf, facet, corners, leaf_starts, extents, nodes, bounds, away
+                p[0], p[1], p[2], np.inf, facet, corners, leaf_starts, extents, nodes, bounds, away
             )
+            here = distance - level
+            if abs(here) < _EXACT * level or high - low < _EXACT * level:
+                break
+            if (here > 0.0) == (at_low > 0.0):
+                low, at_low = x, here
+                at_high = 0.5 * at_high if side == -1 else at_high
+                side = -1
+            else:
+                high, at_high = x, here
+                at_low = 0.5 * at_low if side == 1 else at_low
+                side = 1
         points[m] = p
         for k in range(3):
             normals[m, k] = away[k] / distance

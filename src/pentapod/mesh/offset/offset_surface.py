@@ -25,7 +25,6 @@ from pentapod.base.errors import MeshError
 from pentapod.mesh.offset.dual_contouring import Crossings, Grid, dual_contour
 from pentapod.mesh.offset.refinement import Edges, Nodes, divided, indices, missed_cells
 from pentapod.mesh.query.tree import FacetTree
-from pentapod.numerics.threads import in_blocks_on_cores
 
 MOST_NODES, MOST_BLOCKS = 30_000_000, 60_000_000
 _BLOCK, _GROUP = 4, 8
@@ -125,14 +124,8 @@ def _contour(tree: FacetTree, nodes: Nodes, blocks: _Blocks, wide: Bools, distan
     starts = cells.grid.points(nodes.keys[rows])
     points, normals = np.empty_like(starts), np.empty_like(starts)
     metres = (cells.grid.step * lengths).astype(np.float64)
-    outward, mesh = outside[rows], (tree.corners, tree.starts, tree.extents)
-
-    def work(rows: slice) -> None:
-        edges = starts[rows], axes[rows], metres[rows], outward[rows]
-        cross_level(*edges, distance, *mesh, points[rows], normals[rows])
-
-    in_blocks_on_cores(work, len(rows))
-    crossings = Crossings(nodes.keys[rows], axes, lengths, outward, points, normals)
+    cross_level(starts, axes, metres, distance, tree.corners, tree.starts, tree.extents, points, normals)
+    crossings = Crossings(nodes.keys[rows], axes, lengths, outside[rows], points, normals)
     vertices, triangles, _ = dual_contour(cells, nodes.keys, outside, crossings)
     return onto_level(tree, vertices, distance, _ROUNDS, _ON_LEVEL)[0], triangles
 
@@ -149,12 +142,7 @@ def onto_level(
     from pentapod.mesh.offset.level_kernels import move_onto_level  # noqa: PLC0415  loads numba
 
     points, gaps = np.array(points, dtype=np.float64), np.empty(len(points))
-    mesh = tree.corners, tree.starts, tree.extents
-
-    def work(rows: slice) -> None:
-        move_onto_level(points[rows], distance, rounds, accuracy * distance, *mesh, gaps[rows])
-
-    in_blocks_on_cores(work, len(points))
+    move_onto_level(points, distance, rounds, accuracy * distance, tree.corners, tree.starts, tree.extents, gaps)
     return points, gaps
 
 

@@ -15,7 +15,6 @@ import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints, read_only
 from pentapod.mesh.mesh import Mesh
-from pentapod.numerics.threads import in_blocks_on_cores
 
 FACETS_PER_LEAF = 4
 """Facets below each leaf, about: few make the tree deep, many make leaves slow."""
@@ -72,12 +71,8 @@ class FacetTree:
 
         distances, away = np.empty(len(points)), np.empty((len(points), 3))
         facets = np.empty(len(points), dtype=np.intp)
-        points, mesh = read_only(points), (self.corners, self.starts, self.extents)
-
-        def work(rows: slice) -> None:
-            closest_of_all(points[rows], within, *mesh, distances[rows], away[rows], facets[rows])
-
-        in_blocks_on_cores(work, len(points))
+        given = (read_only(points), within, self.corners, self.starts, self.extents)
+        closest_of_all(*given, distances, away, facets)
         return distances, away, facets
 
     def within(self, points: Floats, distance: float) -> Bools:
@@ -85,26 +80,18 @@ class FacetTree:
         from pentapod.mesh.query.segment_kernels import all_within  # noqa: PLC0415 - loads numba
 
         found = np.empty(len(points), dtype=np.bool_)
-        points, mesh = np.ascontiguousarray(points), (self.corners, self.starts, self.extents)
-
-        def work(rows: slice) -> None:
-            all_within(points[rows], distance, *mesh, found[rows])
-
-        in_blocks_on_cores(work, len(points))
+        all_within(np.ascontiguousarray(points), distance, self.corners, self.starts, self.extents, found)
         return found
 
     def clear(self, starts: Floats, ends: Floats, least: float) -> Bools:
         """Return which chords (M,) are nowhere nearer to the mesh than `least` metres."""
         from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415 - loads numba
 
-        count, travels, mesh = len(starts), ends - starts, (self.corners, self.boxes, self.starts)
+        count = len(starts)
         distances, where, facets = np.empty(count), np.empty((count, 4)), np.empty(count, dtype=np.intp)
-
-        def work(rows: slice) -> None:
-            found = distances[rows], where[rows], facets[rows]
-            nearest_all(starts[rows], travels[rows], *mesh, least, False, *found)
-
-        in_blocks_on_cores(work, count)
+        nearest_all(
+            starts, ends - starts, self.corners, self.boxes, self.starts, least, False, distances, where, facets
+        )
         return facets < 0
 
 
