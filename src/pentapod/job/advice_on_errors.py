@@ -16,7 +16,7 @@ from pentapod.machine.machine import Machine
 if TYPE_CHECKING:
     from pentapod.job.advice.search import Advised
 
-_KEYS = frozenset(("region", "gouge.remedy", "part.unit", "part.scale", "curve", "shallowest"))
+_KEYS = frozenset(("region", "gouge.remedy", "part.unit", "part.scale", "curve", "toolpath.shallowest_deg"))
 
 
 def can_help(error: InputError) -> bool:
