@@ -10,7 +10,6 @@ from pentapod.kinematics.component import Component
 from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
-from pentapod.numerics.threads import CORES
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.sampling import SamplingOptions, first_guesses
 from pentapod.planning.placement.search import SearchOptions, search
@@ -76,31 +75,3 @@ def test_first_guesses_judged_in_part_are_those_judged_whole(desk, cap):
     )
     assert [guess.margin for guess in few] == [guess.margin for guess in every]
     assert [guess.margin for guess in few] == sorted((guess.margin for guess in few), reverse=True)
-
-
-def test_a_search_on_one_core_and_on_two_finds_the_same_bits(desk, cap, monkeypatch):
-    problem = PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk)
-    found = []
-    for cores in ("1", "2"):
-        monkeypatch.setenv(CORES, cores)
-        found.append(search(problem, options=SearchOptions(refined=3)))
-    one, two = found
-    assert one.tried == two.tried == 3
-    assert one.best.smallest == two.best.smallest
-    assert np.array_equal(one.best.transform.matrix, two.best.transform.matrix)
-    assert np.array_equal(one.best.coefficients, two.best.coefficients)
-
-
-def test_starts_that_are_improved_at_once_are_compared_with_those_before_them(desk, cap, monkeypatch):
-    """Two at a time know the same candidates; a number to improve in any case that is odd is kept."""
-    known = []
-
-    def raise_margin(self, start, enough=np.inf, others=None):
-        known.append(None if others is None else len(others))
-        return start
-
-    monkeypatch.setenv(CORES, "1")
-    monkeypatch.setattr("pentapod.planning.placement.sequential.SequentialSolver.raise_margin", raise_margin)
-    problem = PlacementProblem.of(ToolpathSamples.of(cap, 0.2), desk)
-    search(problem, options=SearchOptions(refined=3, tried=3, polished=False))
-    assert known[:3] == [0, 0, 2]

@@ -14,7 +14,6 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.planning.limits.margins import Margins
 from pentapod.planning.problem.formulation import point_function, room_function, stepped
 from pentapod.planning.problem.linear_model import valleys
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
@@ -70,9 +69,6 @@ class IpoptSolver:
     patience: float = 1e6
     options: IpoptOptions = IpoptOptions()
     _solvers: dict[Any, Any] = field(default_factory=dict[Any, Any])
-
-    def prepare(self, margins: Margins) -> None:
-        """Do nothing: programs differ from each other."""
 
     def raise_margin(
         self, start: Candidate, enough: float = np.inf, others: Sequence[Candidate] | None = None

@@ -14,7 +14,6 @@ from pentapod.base.progress import Progress, silent
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.collision_world import NOTHING
-from pentapod.numerics.processes import both
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.ipopt import IpoptSolver
 from pentapod.planning.placement.sampling import first_candidate, first_guesses, fitted_gaps
@@ -30,16 +29,14 @@ SolverName = Literal["sequential", "ipopt"]
 class SearchOptions:
     """How many first guesses are improved.
 
-    refined: number in any case. tried: maximum while none is good enough. at_once: how many are, on two cores or on
-    one, before they are compared: 1 or 2. hopeless: where all guesses are below this margin, the search is first made
-    without obstacles. beyond_reach: best margin after the first `refined` starts below which no other start is expected
-    to lead to a placement that fits. waypoints: used in every step from a given start. polished: whether the best is
-    improved until nothing is gained also where it fits.
+    refined: number in any case. tried: maximum while none is good enough. hopeless: where all guesses are below this
+    margin, the search is first made without obstacles. beyond_reach: best margin after the first `refined` starts below
+    which no other start is expected to lead to a placement that fits. waypoints: used in every step from a given start.
+    polished: whether the best is improved until nothing is gained also where it fits.
     """
 
     refined: int = 4
     tried: int = 10
-    at_once: Literal[1, 2] = 2
     hopeless: float = -0.5
     beyond_reach: float = -0.1
     waypoints: int = 600
@@ -52,17 +49,12 @@ Start = tuple[Margins, RigidTransform]
 class Solver(Protocol):
     """A local solver: `sequential`, the default, or `ipopt`, the reference."""
 
-    def prepare(self, margins: Margins) -> None:
-        """Make what all improvements of candidates with these margins need."""
-        ...
-
     def raise_margin(
         self, start: Candidate, enough: float = np.inf, others: Sequence[Candidate] | None = None
     ) -> Candidate:
         """Return a candidate near `start` with the largest smallest margin, or with `enough`; never a worse one.
 
-        It has the margins object of `start`. others: candidates found before, with which it is compared; it may end
-        early then.
+        others: candidates found before, with which it is compared; it may end early then.
         """
         ...
 
@@ -130,18 +122,15 @@ def search(
         count = options.tried if constraints.moves else len(problem.margins) * len(constraints.poses)
         others = list[Candidate]()
         improver, gaps = SOLVERS[solver](problem, constraints.moves), fitted_gaps(problem)
-        waiting = islice(chain([(first, best_guess)], starts), count)
-        while not (constraints.moves and tried >= options.refined and best is not None and _is_decided(best, options)):
-            least = options.refined - tried if constraints.moves and tried < options.refined else options.at_once
-            begun = [start for start, _ in islice(waiting, min(least, options.at_once))]
-            if not begun:
+        for (margins, transform), _ in islice(chain([(first, best_guess)], starts), count):
+            if constraints.moves and tried >= options.refined and best is not None and _is_decided(best, options):
                 break
-            for found in _improved(problem, improver, begun, gaps, others):
-                others.append(found)
-                best = found if best is None or found.smallest > best.smallest else best
-                tried += 1
-                note = f"component {best.margins.scene.branch}, best margin so far {best.smallest:.3f}"
-                progress("placement", tried / count, note)
+            found = improver.raise_margin(first_candidate(problem, margins, transform, gaps), others=others)
+            others.append(found)
+            best = found if best is None or found.smallest > best.smallest else best
+            tried += 1
+            note = f"component {best.margins.scene.branch}, best margin so far {best.smallest:.3f}"
+            progress("placement", tried / count, note)
         # Compared roughly, the best may be just short of the margin that is needed.
         rough = best is not None and (options.polished or best.smallest < NEEDED_MARGIN)
         if rough and best is not None and best.smallest >= options.beyond_reach:
@@ -165,27 +154,6 @@ def improved_from(
     rows = np.sort(problem.samples.representatives(options.waypoints))
     best = SequentialSolver(problem, problem.constraints.moves, rows=rows).raise_margin(first)
     return Search(best, 1, 1, False, problem.constraints)
-
-
-def _improved(
-    problem: PlacementProblem, improver: Solver, starts: Sequence[Start], gaps: Floats | None, others: list[Candidate]
-) -> list[Candidate]:
-    """Return what becomes of one start or two, compared with `others` and not with each other: for any cores."""
-    known = tuple(others)
-
-    def improved(start: Start) -> Candidate:
-        return improver.raise_margin(first_candidate(problem, *start, gaps), others=known)
-
-    def numbers() -> tuple[RigidTransform, Floats, float]:
-        found = improved(starts[1])
-        return found.transform, found.coefficients, found.smallest
-
-    if len(starts) == 1:
-        return [improved(starts[0])]
-    for margins, _ in starts:
-        improver.prepare(margins)
-    one, other = both(lambda: improved(starts[0]), numbers)
-    return [one, Candidate(starts[1][0], *other)]
 
 
 def _is_decided(best: Candidate, options: SearchOptions) -> bool:

@@ -17,14 +17,7 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.curvature import Curvature
 from pentapod.planning.placement.rail_positions import STEP_M, at_rail_positions, with_guides, with_travel
-from pentapod.planning.problem.formulation import (
-    Room,
-    StepSlopes,
-    curvature_function,
-    placement_room,
-    step_slopes,
-    stepped,
-)
+from pentapod.planning.problem.formulation import Room, StepSlopes, placement_room, step_slopes, stepped
 from pentapod.planning.problem.linear_model import REACH, LinearModel, valleys
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.tool_axis.smoothing import smoothed
@@ -77,11 +70,6 @@ class SequentialSolver:
     guides: bool = False
     options: SequentialOptions = SequentialOptions()
     rows: Ints | None = None
-
-    def prepare(self, margins: Margins) -> None:
-        """Make the derivatives of these margins, which all steps need."""
-        step_slopes(self.problem, margins, guides=self.guides)
-        curvature_function(self.problem, margins, guides=self.guides)
 
     def raise_margin(
         self, start: Candidate, enough: float = np.inf, others: Sequence[Candidate] | None = None
