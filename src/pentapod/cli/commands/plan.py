@@ -49,9 +49,9 @@ def plan(
     cannot be done are searched for and planned, and those whose verdict passed are printed. A job in several set-ups
     has a folder of files for each: setup-1, setup-2, and so on.
 
-    Several jobs are planned one after the other, each into a folder of its name in OUT; what one of them cannot does
-    not stop the others, and the exit code is the largest one. `pentapod batch` uses all cores, and goes on after an
-    interruption.
+    Several jobs are planned one after the other, each into a folder of its name in OUT. If one of them cannot be done,
+    the others are planned all the same. The exit code is the largest one. `pentapod batch` uses all cores, and goes on
+    after an interruption.
 
     Ctrl-C during the search for a placement continues with the best one so far, if that fits. During the
     search for changes it ends that. At any other time it ends the command and changes nothing.
