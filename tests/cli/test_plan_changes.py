@@ -12,7 +12,7 @@ from pentapod.job import Job
 
 def test_other_values_are_planned_and_their_job_is_kept(make_job, tmp_path, capsys):
     job, out = make_job(), tmp_path / "out"
-    changes = ["--set", "feed.cut_mm_min=1800", "--set", "placement.component = ++"]
+    changes = ["--set", "feed.cut_mm_min=1800", "--set", "placement.component = ++", "--set", 'tool.type="""\nball"""']
     assert run(["plan", str(job), "-o", str(out), *changes, "-q"]) == 0
     changed = Job.load(out / "changed-job.toml")
     assert changed.feed.cut_mm_min == 1800.0

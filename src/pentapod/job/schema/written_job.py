@@ -21,7 +21,8 @@ def write_job(job: Job, content: dict[str, Any], file: Path, remark: str) -> Job
     for table, key, path in job.named_files:
         content[table][key] = _relative(path, file.parent)
     with atomic_write(file) as temporary:
-        temporary.write_text(f"# {job.path.name}, {remark}\n\n{toml_text(content)}", encoding="utf-8")
+        head = "# " + " ".join(f"{job.path.name}, {remark}".split())  # a value may have several lines
+        temporary.write_text(f"{head}\n\n{toml_text(content)}", encoding="utf-8")
     return Job.load(file)
 
 
