@@ -18,13 +18,17 @@ STEPOVER = 3e-3
 
 @pytest.mark.slow
 @pytest.mark.parametrize("end", ENDS)
-@pytest.mark.parametrize("name", ["ribs", "stairs", "valley"])
+@pytest.mark.parametrize("name", ["ribs", "stairs", "valley", "egg_crate"])
 def test_what_is_left_is_what_the_end_cannot_reach(name, end):
     part, tool = concave_parts.mesh(name), ENDS[end]
     toolpath, _ = toolpath_with_report(part, tool, RasterOptions(stepover=STEPOVER), np.array([0.0, 0.0, 1.0]))
     reachable = ReachableTips(part, tool)
     left = left_by_end(reachable, reachable.samples(3000, steepest_deg=80.0), toolpath, STEPOVER)
-    assert left.beyond <= 1e-3
+    if name == "egg_crate":
+        # Between passes across slopes such ends leave more than a ball; its lows have no creases to be missed.
+        assert (left.excess <= left.allowed).all()
+    else:
+        assert left.beyond <= 1e-3
     assert left.lifts <= 1
     assert left.air <= 0.25 * left.cut
     assert gouges(part, tool, toolpath, 1.1e-5) == 0

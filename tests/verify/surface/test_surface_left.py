@@ -1,6 +1,7 @@
 """What a cutter leaves on a region: against closed forms, and against dense samples in plain NumPy."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,7 +21,8 @@ from pentapod.mesh.region import Region
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.verify import Coverage, Cutting
 from pentapod.verify.replay.claim import Idle
-from pentapod.verify.surface.surface_left import surface_left
+from pentapod.verify.surface import surface_left as module
+from pentapod.verify.surface.surface_left import SurfaceOptions, surface_left
 
 R = 3e-3
 
@@ -106,6 +108,21 @@ def test_a_flat_end_that_could_clear_a_floor_up_to_the_wall_must(make):
     short = along(*raster(2e-3, y0=R + 2e-3, **ends), tool=tool)
     found = judged(short, mesh, tool, 2e-4, region=Region(angle=0.5))
     assert found.value == pytest.approx(100.0 * 2e-3 * size / size**2, rel=0.15)
+
+
+@pytest.mark.parametrize(("share", "passed"), [(0.9, False), (1.1, True)])
+def test_a_share_near_its_bound_is_sampled_more_finely(monkeypatch, share, passed):
+    """With 64 samples chance decides (16 % for 19.1 %); the foot of the walls is left by the ball's shape."""
+    size, tool = 0.02, BallCutter(R)
+    replay = along(*raster(1e-3, low=R, high=size - R, y0=R + 5e-4, y1=size - R + 1e-9), tool=tool)
+
+    def found(bound, **options):
+        monkeypatch.setattr(module, "OPTIONS", replace(SurfaceOptions(), **options))
+        return judged(replay, pocket(), tool, 2e-4, share=bound, region=Region(angle=0.5))
+
+    every = 0.01 * found(0.0, balls=10**6).value
+    assert found(share * every, balls=64, again=0).value < 90.0 * every
+    assert found(share * every, balls=64).passed == passed
 
 
 def test_what_the_view_does_not_see_is_told_apart():

@@ -11,7 +11,7 @@ is left above the limit surface (`limit_surface.py`), along the normal of that.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,8 +38,10 @@ class SurfaceOptions:
     coarse: size of the first cells as a share of what one position of the cutter covers; finest: ratio to the smallest
     ones; cells: no cell is smaller than the region divided by so many. near_m, near_share: deviation of the motion from
     a straight stretch, in metres or as a share of what may be left. balls, bodies: at most so many cells that are left
-    are compared with the limit surface, for a ball and for other cutters, each for its share of the area. far: radii of
-    the cutter along the normal up to which material is measured.
+    are compared with the limit surface, for a ball and for other cutters, each for its share of the area. more: times
+    as many, and again up to `again` times, where the share that is found is so near to its bound that chance would
+    decide: within `near_deviations` standard deviations. far: radii of the cutter along the normal up to which material
+    is measured.
     """
 
     coarse: float = 0.25
@@ -49,6 +51,9 @@ class SurfaceOptions:
     near_share: float = 0.01
     balls: int = 2048
     bodies: int = 256
+    more: int = 4
+    again: int = 2
+    near_deviations: float = 2.0
     far: float = 4.0
 
 
@@ -133,10 +138,47 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
         one.entries(middles, normals, most)
     met = most <= height
     between = float(areas[met].sum())
-    middles, normals, areas = middles[~met], normals[~met], areas[~met]
     by_ball = all(is_ball_end(replay, solid) for solid in solids[:1])
-    chosen, weights = _chosen(areas, OPTIONS.balls if by_ball else OPTIONS.bodies)
-    middles, normals = middles[chosen], normals[chosen]
+    cells = _Cells(middles[~met], normals[~met], areas[~met], height, reach, (float(highest[0]), highest[1:]), by_ball)
+    allowed, count = coverage.share * float(region.areas.sum()), OPTIONS.balls if by_ball else OPTIONS.bodies
+    found = _sampled(replay, coverage, cutting, cells, swept, count)
+    for _ in range(OPTIONS.again):
+        if not (len(cells.areas) > count and _undecided(found.missed, allowed, float(cells.areas.sum()) / count)):
+            break
+        count *= OPTIONS.more
+        found = _sampled(replay, coverage, cutting, cells, swept, count)
+    return replace(found, between=between, cell=2.0 * fine)
+
+
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """Small cells of which none is proven covered, nor its middle found to be.
+
+    middles, normals (C, 3), areas (C,). height: metres that may be left. reach: radius of the cutter. highest: of what
+    is left over the covered cells, metres, and where. by_ball: the cutter ends in a ball.
+    """
+
+    middles: Floats
+    normals: Floats
+    areas: Floats
+    height: float
+    reach: float
+    highest: tuple[float, Floats]
+    by_ball: bool
+
+
+def _undecided(missed: float, allowed: float, each: float) -> bool:
+    """Return whether samples of area `each` cannot tell a missed area from the allowed one."""
+    return missed > 0.0 and abs(missed - allowed) <= OPTIONS.near_deviations * np.sqrt(max(missed, allowed) * each)
+
+
+def _sampled(
+    replay: Replay, coverage: Coverage, cutting: Cutting, cells: _Cells, swept: list[SweptSolid], count: int
+) -> _Left:
+    """Return what is left on cells, of which at most `count` are compared with the limit surface."""
+    height, reach = cells.height, cells.reach
+    chosen, weights = _chosen(cells.areas, count)
+    middles, normals = cells.middles[chosen], cells.normals[chosen]
     limit = LimitSurface.above(replay, coverage, cutting, middles, normals)
     known = np.isfinite(limit.heights)
     everywhere, excused = (middles, normals, weights), ~known
@@ -146,7 +188,7 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
         one.entries(above.points, above.normals, heights)
         one.distances(above.points, gaps)
     own, shaped = (above.heights == 0.0) | (heights > height), above.heights > 0.0
-    kept_off = np.flatnonzero(own & shaped) if by_ball else np.zeros(0, dtype=np.intp)
+    kept_off = np.flatnonzero(own & shaped) if cells.by_ball else np.zeros(0, dtype=np.intp)
     if len(kept_off):
         at, its_normals, limit = middles[kept_off], normals[known][kept_off], above.where(own & shaped)
         kept_off = kept_off[under_overhangs(cutting, coverage, at, its_normals, limit)]
@@ -154,7 +196,7 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
         excused[np.flatnonzero(known)[kept_off]] = True
         unknown += float(weights[kept_off].sum())
     own = np.flatnonzero(own)
-    deepest, place, gap = float(highest[0]), highest[1:], 0.0
+    (deepest, place), gap = cells.highest, 0.0
     if len(own):
         worst = own[np.lexsort((gaps[own], heights[own] if cutting.cutter else gaps[own]))[-1]]
         gap = max(float(gaps[own].max()), 0.0)
@@ -165,8 +207,8 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
         unknown,
         float(weights[shaped].sum()),
         float(above.heights[shaped].max(initial=0.0)),
-        between,
-        2.0 * fine,
+        0.0,
+        0.0,
         deepest,
         place,
         gap,
