@@ -78,3 +78,18 @@ def test_tip_surface_turns_with_part_and_axis():
     inside = tips[(np.abs(tips[:, 0]) < 6e-3) & (np.abs(tips[:, 1]) < 4e-3)]
     assert abs(inside[:, 2].min() - 4e-3) < 1e-6
     assert np.abs(np.abs(inside[inside[:, 2] < 4.001e-3]).max(axis=0)[:2] - [4e-3, 2e-3]).max() < 2e-5
+
+
+@pytest.mark.parametrize("tool", [FLAT, BULL], ids=["flat", "bull"])
+def test_end_on_an_open_cap_keeps_within_its_border(tool):
+    """At the border, rounded outwards, a lowered cutter meets nothing."""
+    angle, turn = np.meshgrid(np.radians(np.linspace(0.0, 55.0, 12)), np.linspace(0.0, 2.0 * np.pi, 49))
+    x, y = 18.0 * np.sin(angle) * np.cos(turn), 18.0 * np.sin(angle) * np.sin(turn)
+    k = np.arange(angle.size).reshape(angle.shape)
+    a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[:-1, 1:], k[1:, 1:], k[1:, :-1]))
+    faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)])
+    mesh = part((np.stack([x, y, 18.0 * np.cos(angle)], axis=-1).reshape(-1, 3), faces))
+    tips = cuts(raster(mesh, tool, UP))
+    assert np.isfinite(tips).all()
+    assert np.hypot(tips[:, 0], tips[:, 1]).max() < 18e-3 * np.sin(np.radians(55.0)) + tool.radius
+    assert gouges(mesh, tool, make_toolpath(mesh, tool, RasterOptions(stepover=1.8e-3), UP), 1.1e-5) == 0

@@ -138,6 +138,9 @@ class TipSurface(RolledSurface):
         lowered, frame = self.tips.lowered, self.tips.frame
         local = points @ frame.T
         touched = lowered.touched(local[:, :2])
+        # At the very edge, rounded outwards, the cutter meets nothing: there its nearest point of the part counts.
+        past = np.isnan(touched[:, 0])
+        touched[past] = local[past] - lowered.tree.closest(local[past])[1]
         facets = lowered.tree.facets[lowered.tree.closest(touched)[2]]
         lead = self._leads(self.part.facet_normals[facets]) @ frame.T
         return touched @ frame, np.linalg.norm((local - touched - lead)[:, :2], axis=1)
