@@ -14,7 +14,7 @@ from itertools import groupby
 import numpy as np
 from scipy.spatial import KDTree
 
-from left_material import dense
+from left_material import columns_at_jumps, dense
 from pentapod import Mesh
 from pentapod.cutters.bull_nose import BullNose
 from pentapod.toolpath import SegmentKind, Toolpath
@@ -69,14 +69,7 @@ class ReachableTips:
             middle = self._at(0.5 * (a[:, :2] + b[:, :2]))
             made.append(middle)
             a, b = np.concatenate([a, middle]), np.concatenate([middle, b])
-        jump = np.abs(a[:, 2] - b[:, 2]) > self.pitch
-        a, b = a[jump], b[jump]
-        lower = np.where((a[:, 2] < b[:, 2])[:, None], a, b)
-        count = np.ceil(np.abs(a[:, 2] - b[:, 2]) / self.pitch).astype(int)
-        owner = np.repeat(np.arange(len(count)), count)
-        column = lower[owner]
-        column[:, 2] += (np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)) * self.pitch
-        return [*made, column]
+        return [*made, columns_at_jumps(a, b, self.pitch)]
 
     def samples(self, count: int, steepest_deg: float = 90.0, seed: int = 2):
         """Points (N, 3) spread evenly over what is seen from above, walls too, not what is lowest on the outside."""
@@ -122,17 +115,26 @@ class Nearest:
 
 @dataclass(frozen=True)
 class LeftByEnd:
-    """What a toolpath leaves on samples, metres. limit, excess, allowed, lifts, cut, links, air: as in `Left`."""
+    """What a toolpath leaves on samples, metres. limit, excess, allowed, lifts, cut, links, air: as in `Left`.
+
+    off: distance of the nearest cut from the tip that would leave least.
+    """
 
     tool: BullNose
     stepover: float
     limit: np.ndarray
     excess: np.ndarray
     allowed: np.ndarray
+    off: np.ndarray
     cut: float
     links: float
     air: float
     lifts: int
+
+    @property
+    def missed(self) -> float:
+        """Share of the samples whose best tip is farther from a cut than half a stepover and 0.2 mm."""
+        return float((self.off > 0.5 * self.stepover + 2e-4).mean())
 
     @property
     def beyond(self) -> float:
@@ -156,7 +158,8 @@ def left_by_end(reachable: ReachableTips, points, toolpath: Toolpath, stepover: 
     gap, home = Nearest(tool, reachable.tips).of(points)
     cuts = np.concatenate([dense(line, 1e-4) for line, kind in lines if kind is SegmentKind.CUT])
     near, allowed = KDTree(reachable.tips), np.zeros(len(points))
-    for k in np.flatnonzero(np.isfinite(home[:, 0])):
+    known = np.isfinite(home[:, 0])
+    for k in np.flatnonzero(known):
         around = reachable.tips[near.query_ball_point(home[k], 0.5 * stepover + reachable.pitch)]
         allowed[k] = distances(tool, points[k] - around).max() - gap[k]
     kinds = [k for _, k in lines]
@@ -168,6 +171,7 @@ def left_by_end(reachable: ReachableTips, points, toolpath: Toolpath, stepover: 
         limit=gap,
         excess=Nearest(tool, cuts).of(points)[0] - gap,
         allowed=allowed,
+        off=KDTree(cuts).query(home[known])[0],
         cut=length[SegmentKind.CUT],
         links=length[SegmentKind.LINK],
         air=length[SegmentKind.RAPID],

@@ -21,6 +21,18 @@ from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath import SegmentKind, Toolpath
 
 
+def columns_at_jumps(a, b, pitch):
+    """Points, `pitch` apart, upwards from the lower of neighbours (E, 3) whose heights differ by more than that."""
+    jump = np.abs(a[:, 2] - b[:, 2]) > pitch
+    a, b = a[jump], b[jump]
+    lower = np.where((a[:, 2] < b[:, 2])[:, None], a, b)
+    count = np.ceil(np.abs(a[:, 2] - b[:, 2]) / pitch).astype(int)
+    owner = np.repeat(np.arange(len(count)), count)
+    column = lower[owner]
+    column[:, 2] += (np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)) * pitch
+    return column
+
+
 class Reachable:
     """The lowest centres of a ball of `radius` metres that comes from above (+z), about `pitch` metres apart."""
 
@@ -52,15 +64,7 @@ class Reachable:
             a, b, middle = a[wanted], b[wanted], np.column_stack([middle[:, :2], height])[wanted]
             made.append(middle)
             a, b = np.concatenate([a, middle]), np.concatenate([middle, b])
-        jump = np.abs(a[:, 2] - b[:, 2]) > self.pitch
-        a, b = a[jump], b[jump]
-        lower = np.where((a[:, 2] < b[:, 2])[:, None], a, b)
-        count = np.ceil(np.abs(a[:, 2] - b[:, 2]) / self.pitch).astype(int)
-        owner = np.repeat(np.arange(len(count)), count)
-        step = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-        column = lower[owner]
-        column[:, 2] += step * self.pitch
-        return [*made, column]
+        return [*made, columns_at_jumps(a, b, self.pitch)]
 
     @cached_property
     def near(self) -> KDTree:

@@ -24,11 +24,9 @@ def test_what_is_left_is_what_the_end_cannot_reach(name, end):
     toolpath, _ = toolpath_with_report(part, tool, RasterOptions(stepover=STEPOVER), np.array([0.0, 0.0, 1.0]))
     reachable = ReachableTips(part, tool)
     left = left_by_end(reachable, reachable.samples(3000, steepest_deg=80.0), toolpath, STEPOVER)
-    if name == "egg_crate":
-        # Between passes across slopes such ends leave more than a ball; its lows have no creases to be missed.
-        assert (left.excess <= left.allowed).all()
-    else:
-        assert left.beyond <= 1e-3
+    assert left.missed <= 1e-3
+    # On smooth slopes such ends leave more between passes than the ball whose ridge is the bound.
+    assert left.beyond <= 1e-3 or name == "egg_crate"
     assert left.lifts <= 1
     assert left.air <= 0.25 * left.cut
     assert gouges(part, tool, toolpath, 1.1e-5) == 0

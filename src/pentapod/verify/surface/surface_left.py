@@ -2,7 +2,7 @@
 
 The region is subdivided into cells until each is proven covered: at the height that may be left, above every point of
 the cell, one convex piece of the swept volume has been. Cells for which this cannot be proven are halved until they are
-small; then their middle decides. The message gives the area of those cells.
+small; then their middle decides. The message gives the area of those cells. Of many cells a sample stands for all.
 
 Where the cutter touches the part, such a cell is missed. Where its shape must leave material (a fillet narrower than
 the ball, the foot of a wall), what counts is what is left beyond that: the cell is missed if more than the job allows
@@ -38,9 +38,9 @@ class SurfaceOptions:
     coarse: size of the first cells as a share of what one position of the cutter covers; finest: ratio to the smallest
     ones; cells: no cell is smaller than the region divided by so many. near_m, near_share: deviation of the motion from
     a straight stretch, in metres or as a share of what may be left. balls, bodies: at most so many cells that are left
-    are compared with the limit surface, for a ball and for other cutters, each for its share of the area. more: times
-    as many, and again up to `again` times, where the share that is found is so near to its bound that chance would
-    decide: within `near_deviations` standard deviations. far: radii of the cutter along the normal up to which material
+    are compared with the limit surface, for a ball and for other cutters, each for its share of the area. again: so
+    often this is repeated with `more` times as many cells, as long as the share that is found is within
+    `near_deviations` standard deviations of its bound. far: radii of the cutter along the normal up to which material
     is measured.
     """
 
@@ -73,7 +73,8 @@ class _Left:
     cells show that no more is left. shape: the largest height that the shape leaves there. cell: largest width of those
     cells, metres. deepest: largest height along the normal that is left where the tool could have been, metres,
     measured up to `far`; place (3,): where. gap: largest distance of the cutter from where it could have been, 0 where
-    nothing is missed. leant: area of `beyond` that a tool that leans might reach.
+    nothing is missed. leant: area of `beyond` that a tool that leans might reach. sampled, cells: so many of so many
+    cells were compared with the limit surface.
     """
 
     missed: float
@@ -86,7 +87,9 @@ class _Left:
     place: Floats
     gap: float
     far: float
-    leant: float = 0.0
+    leant: float
+    sampled: int
+    cells: int
 
 
 def surface_left(replay: Replay) -> Finding | Idle:
@@ -214,6 +217,8 @@ def _sampled(
         gap,
         OPTIONS.far * reach,
         _leant(coverage, cutting, *(each[excused] for each in everywhere)),
+        len(chosen),
+        len(cells.areas),
     )
 
 
@@ -276,8 +281,10 @@ def _method(found: _Left, coverage: Coverage, area: float, *, beam: bool) -> str
             f"; {100.0 * found.shaped / area:.3g} %, where the cutter's shape leaves up to {MM * found.shape:.3g} mm,"
         )
         text += f" judged by what is left beyond that, at the middles {cells}"
-    some = found.between > 0.0 or found.shaped > 0.0
+    sample = found.sampled < found.cells
+    some = found.between > 0.0 or found.shaped > 0.0 or sample
     text += ", the rest proven at every point" if some else "; proven at every point"
+    text += f"; {found.sampled:,} of the {found.cells:,} cells not proven stand for all of them" if sample else ""
     text += f"; {100.0 * found.beyond / area:.3g} % more {hidden}" if found.beyond > 0.0 else ""
     if coverage.leans > 0.0 and found.beyond > 0.0:
         text += (
