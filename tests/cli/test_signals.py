@@ -85,6 +85,33 @@ print("end")
     assert (done.returncode, done.stderr) == (0, "")
 
 
+def test_signals_during_a_compilation_wait_for_its_end():
+    """llvmlite's objects, left half made, printed errors when they were destroyed."""
+    code = """
+import signal, sys
+import numba
+from pentapod.cli.signals import Terminated, signals_as_exceptions
+raised = []
+def hook(frame, event, argument):
+    made = type(frame.f_locals.get("self")).__name__ if frame.f_code.co_name == "__init__" else ""
+    if event == "call" and made == "PassBuilder" and not raised:
+        raised.append(frame.f_code.co_filename)
+        signal.raise_signal(signal.SIGTERM)
+with signals_as_exceptions():
+    try:
+        sys.setprofile(hook)
+        numba.njit("int64(int64)")(lambda x: x + 1)
+        sys.setprofile(None)
+        while True:
+            pass
+    except Terminated:
+        sys.setprofile(None)
+        print("ended" if raised else "never in llvmlite")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120)
+    assert (done.stdout.split(), done.stderr) == (["ended"], "")
+
+
 def test_signals_that_the_parent_ignores_stay_ignored(tmp_path):
     command = [sys.executable, "-c", f"import signal; signal.raise_signal(signal.SIGTERM); {MAIN}", "--version"]
     ignoring = lambda: signal.signal(signal.SIGTERM, signal.SIG_IGN)  # noqa: E731

@@ -14,7 +14,10 @@ if TYPE_CHECKING:
     from pentapod.base.progress import Progress
 
 RETRY_S = 0.05
-"""Seconds after which a signal that came during an import is raised again."""
+"""Seconds after which a signal that came at a bad moment is raised again."""
+
+_NOT_IN = ("<frozen importlib", f"{os.sep}pydantic{os.sep}", f"{os.sep}llvmlite{os.sep}")
+"""Where signals wait: in imports; in pydantic, which makes errors of its own of them; in native compilation."""
 
 _unanswered: list[int] = []
 """Signals that were raised and that no search has told of."""
@@ -28,7 +31,8 @@ class Terminated(SystemExit):
 def signals_as_exceptions() -> Generator[None]:
     """Raise KeyboardInterrupt on Ctrl-C and Terminated on SIGTERM; once the block has ended, they end the process.
 
-    A signal during an import is raised after it, because an interrupted import may raise any other error, or none.
+    A signal during an import or a compilation is raised after it, because an interrupted one may raise any other error,
+    or none, or leave objects that cannot be destroyed without an error.
     Signals that the parent process set to be ignored stay ignored.
     """
     handled = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) != signal.SIG_IGN]
@@ -60,7 +64,7 @@ def raising_again(progress: Progress) -> Progress:
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
-    if _is_loading(frame):
+    if _is_in(frame, _NOT_IN):
         later = threading.Timer(RETRY_S, signal.raise_signal, (number,))
         later.daemon = True
         later.start()
@@ -75,11 +79,10 @@ def _end_by(number: int) -> NoReturn:
     raise Terminated(128 + number)
 
 
-def _is_loading(frame: FrameType | None) -> bool:
-    """Whether the import system is among the callers, or pydantic, which makes errors of its own of an interrupt."""
+def _is_in(frame: FrameType | None, folders: tuple[str, ...]) -> bool:
+    """Whether code in one of these folders is among the callers."""
     while frame is not None:
-        file = frame.f_code.co_filename
-        if file.startswith("<frozen importlib") or f"{os.sep}pydantic{os.sep}" in file:
+        if any(folder in frame.f_code.co_filename for folder in folders):
             return True
         frame = frame.f_back
     return False
