@@ -13,6 +13,7 @@ VERBS = {
     "verify": "pentapod.cli.commands.verify:verify",
     "simulate": "pentapod.cli.commands.simulate:simulate",
     "view": "pentapod.cli.commands.view:view",
+    "sheet": "pentapod.cli.commands.sheet:sheet",
     "post": "pentapod.cli.commands.post:post",
     "toolpath": "pentapod.cli.commands.toolpath:toolpath",
     "batch": "pentapod.cli.many.batch:batch",

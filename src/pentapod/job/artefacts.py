@@ -14,11 +14,14 @@ from pentapod.base.errors import InputError
 from pentapod.base.files import atomic_write, packed_arrays
 
 PROGRAM, VERDICT, REPORT, ARRAYS = "program.csv", "verdict.json", "report.html", "plan.npz"
+SHEET = "sheet.html"
+"""The set-up sheet, where there is a program."""
+
 WITHHELD = "withheld.csv"
 """A program that fails its own verdict: to be looked at, never to be run."""
 
 MANIFEST = "manifest.json"
-NAMES = (PROGRAM, WITHHELD, ARRAYS, REPORT, VERDICT, MANIFEST)
+NAMES = (PROGRAM, WITHHELD, ARRAYS, REPORT, SHEET, VERDICT, MANIFEST)
 """In the order in which they are moved into the folder; the manifest is last and marks a complete run."""
 
 SETUPS = "setup-[1-9]*"

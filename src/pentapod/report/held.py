@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pentapod.base.arrays import Floats, Ints
+from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.build.specification import job_fixture
 from pentapod.job.outcome import Outcome
+from pentapod.job.schema.job import Job
 from pentapod.planning.placement.placed_path import PlacedPath
 
 
@@ -21,9 +23,14 @@ class Held:
 
 def held_mesh(outcome: Outcome, placed: PlacedPath) -> Held | None:
     """Return the fixture of an outcome's job at a placement; None where the job has none."""
-    mesh = job_fixture(outcome.job)
+    return held_at(outcome.job, placed.placement.transform)
+
+
+def held_at(job: Job, placement: RigidTransform) -> Held | None:
+    """Return the fixture of a job whose part is at a placement; None where the job has none."""
+    mesh = job_fixture(job)
     if mesh is None:
         return None
-    if outcome.job.fixture.frame == "machine":
+    if job.fixture.frame == "machine":
         return Held("table", mesh.vertices, mesh.faces)
-    return Held("fixture", placed.placement.transform.apply(mesh.vertices), mesh.faces)
+    return Held("fixture", placement.apply(mesh.vertices), mesh.faces)

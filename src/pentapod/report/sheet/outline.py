@@ -20,15 +20,18 @@ class OutlineOptions:
     """How finely an outline is drawn.
 
     cells: of the grid, along the longer side. crease_deg: angle between facets from which their edge is a line. close:
-    how near to its true course a line is drawn, in cells. shortest: the shortest line, in cells. most_lines: where
-    there are more lines, those of creases are left out, and then all.
+    how near to its true course a line is drawn, in cells. shortest: the shortest line, in cells. smallest: the smallest
+    area, or hole, in cells. most_lines, most_links: where there are more lines, or more pieces of them, those of
+    creases are left out, and then all.
     """
 
     cells: int = 900
     crease_deg: float = 35.0
     close: float = 0.6
     shortest: float = 4.0
+    smallest: float = 3.0
     most_lines: int = 3000
+    most_links: int = 60_000
 
 
 OPTIONS = OutlineOptions()
@@ -64,15 +67,15 @@ def outline_of(vertices: Floats, faces: Ints, options: OutlineOptions = OPTIONS)
     grid = Grid.around(vertices[faces.ravel(), :2], options.cells)
     cuts = grid.cuts(vertices[faces])
     covered = grid.covered(cuts)
-    areas = [grid.points(simplified(line, options.close)) for line in _closed(borders(covered))]
-    areas = [line for line in areas if len(line) > 3]
+    areas = [simplified(line, options.close) for line in borders(covered)]
+    areas = [grid.points(line) for line in areas if abs(_area(line)) > options.smallest]
     topology = Topology(faces, len(vertices))
     turns, creases = _edges(vertices, faces, topology, options)
     seen = _Seen(grid, covered, grid.nearest(cuts))
     edges = topology.edges
     for drawn in (turns | creases, turns):
         lines = _joined(seen.parts(vertices[edges[drawn]]), options)
-        if len(lines) <= options.most_lines:
+        if lines is not None and len(lines) <= options.most_lines:
             break
     else:
         lines = []
@@ -80,10 +83,6 @@ def outline_of(vertices: Floats, faces: Ints, options: OutlineOptions = OPTIONS)
     return Outline(
         tuple(areas), tuple(grid.points(line) for line in lines), flat.min(axis=0), flat.max(axis=0)
     )  # fmt: skip
-
-
-def _closed(lines: list[Floats]) -> list[Floats]:
-    return [np.concatenate([line, line[:1]]) for line in lines]
 
 
 def _area(line: Floats) -> float:
@@ -141,14 +140,17 @@ class _Seen:
         return flat[e, None, 0] + t * (flat[e, None, 1] - flat[e, None, 0])
 
 
-def _joined(parts: Floats, options: OutlineOptions) -> list[Floats]:
-    """Return lines (K, 2) of parts (P, 2, 2), joined where two of them meet, and simplified."""
+def _joined(parts: Floats, options: OutlineOptions) -> list[Floats] | None:
+    """Return lines (K, 2) of parts (P, 2, 2), joined where two of them meet, and simplified; None: too many parts."""
     if not len(parts):
         return []
     keys = np.round(2.0 * parts.reshape(-1, 2)).astype(np.intp)
     _, first, node = np.unique(keys[:, 0] * (keys[:, 1].max() + 1) + keys[:, 1], return_index=True, return_inverse=True)
     places, ends = parts.reshape(-1, 2)[first], np.sort(node.reshape(-1, 2), axis=1)
-    ends = np.unique(ends[ends[:, 0] != ends[:, 1]], axis=0)
+    ends = ends[ends[:, 0] != ends[:, 1]]
+    ends = ends[np.unique(ends[:, 0] * len(places) + ends[:, 1], return_index=True)[1]]
+    if len(ends) > options.most_links:
+        return None
     lines = [simplified(places[walk], options.close) for walk in _walks(ends, len(places))]
     return [line for line in lines if np.abs(np.diff(line, axis=0)).sum() >= options.shortest]
 

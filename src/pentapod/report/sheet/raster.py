@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from pentapod.mesh.query.slicing import chained
 
 AT_ONCE = 2_000_000
 """Cells that are treated at once, so that memory stays small."""
+
+STRAIGHT = 4
+"""Sides of cells in a row that are taken for a straight line."""
 
 RIM = 2
 """Empty cells around the facets."""
@@ -50,8 +54,8 @@ class Grid:
         flat = points.reshape(-1, 2)
         low, high = flat.min(axis=0), flat.max(axis=0)
         step = max(float((high - low).max()), 1e-9) / cells
-        columns, rows = np.ceil((high - low) / step).astype(np.intp) + 2 * RIM + 1
-        return cls(low - (RIM + 0.5) * step, step, (int(rows), int(columns)))
+        columns, rows = np.ceil((high - low) / step - 1e-6).astype(np.intp) + 2 * RIM
+        return cls(low - RIM * step, step, (int(rows), int(columns)))
 
     def cells(self, points: Floats) -> Floats:
         """Return points (..., 2) counted in cells from the lower left corner."""
@@ -113,14 +117,15 @@ class Grid:
 def _parts(counts: Ints) -> Iterator[slice]:
     """Yield slices of runs whose members are about AT_ONCE together."""
     block = np.cumsum(counts) // AT_ONCE
-    borders = [0, *(np.flatnonzero(np.diff(block)) + 1).tolist(), len(counts)]
-    yield from (slice(a, b) for a, b in zip(borders, borders[1:], strict=False) if b > a)
+    edges = [0, *(np.flatnonzero(np.diff(block)) + 1).tolist(), len(counts)]
+    yield from (slice(a, b) for a, b in pairwise(edges) if b > a)
 
 
 def borders(covered: Bools) -> list[Floats]:
     """Return the closed lines (K, 2) around covered cells, counted in cells; the covered side is on their left.
 
-    They go through the middles of the cells' sides, so that steps become slopes. Holes are lines of their own.
+    They go through the middles of the cells' sides, so that steps become slopes, and through corners between straight
+    parts of at least STRAIGHT sides. They end where they begin. Holes are lines of their own.
     """
     rows, columns = covered.shape
     wide = columns + 1
@@ -141,8 +146,20 @@ def borders(covered: Bools) -> list[Floats]:
     if not len(cell):
         return []
     order, chain = chained(_after(cell, start, end))
-    middle = 0.5 * np.stack([start % wide + end % wide, start // wide + end // wide], axis=1)[order]
-    return np.split(middle, np.flatnonzero(np.diff(chain)) + 1)
+    ends = np.stack([start % wide, start // wide, end % wide, end // wide], axis=1)[order].astype(np.float64)
+    return [_line(side[:, :2], side[:, 2:]) for side in np.split(ends, np.flatnonzero(np.diff(chain)) + 1)]
+
+
+def _line(starts: Floats, ends: Floats) -> Floats:
+    """Return the closed line (K, 2) along sides of cells (N, 2) that follow each other."""
+    headings = ends - starts
+    turns = np.flatnonzero((headings != np.roll(headings, 1, axis=0)).any(axis=1))
+    starts, ends = np.roll(starts, -turns[0], axis=0), np.roll(ends, -turns[0], axis=0)
+    at = turns - turns[0]
+    lengths = np.diff(np.append(at, len(starts)))
+    sharp = at[np.minimum(lengths, np.roll(lengths, 1)) >= STRAIGHT]
+    line = np.insert(0.5 * (starts + ends), sharp, starts[sharp], axis=0)
+    return np.concatenate([line, line[:1]])
 
 
 def _after(cell: Ints, start: Ints, end: Ints) -> Ints:

@@ -8,10 +8,8 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.units import from_si
-from pentapod.machine.machine import Machine
-from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.tree import FacetTree
-from pentapod.planning.placement.placed_path import PlacedPath
+from pentapod.report.sheet.planned_run import PlannedRun
 from pentapod.toolpath.toolpath import SegmentKind
 
 COUNT = 3
@@ -34,17 +32,16 @@ class TouchOff:
     legs: Floats
 
 
-def touch_off_points(mesh: Mesh, placed: PlacedPath, machine: Machine) -> list[TouchOff]:
+def touch_off_points(run: PlannedRun) -> list[TouchOff]:
     """Return points of the cuts that are far from each other, with the tool as the program has it there."""
-    rows = _spread(placed, COUNT)
+    rows = _spread(run, COUNT)
     if not len(rows):
         return []
-    back = placed.placement.transform.inverse()
-    centres = back.apply(placed.tilt_centres[rows])
-    feet = centres - FacetTree.of(mesh).closest(centres)[1]
-    tips, axes = placed.tips[rows], placed.axes[rows]
+    machine, tips, axes = run.machine, run.tips[rows], run.axes[rows]
+    centres = run.placement.inverse().apply(tips + run.toolpath.tilt_centre * axes)
+    feet = centres - FacetTree.of(run.mesh).closest(centres)[1]
     legs = machine.robot.leg_lengths(tips + machine.tool_length * axes, -axes)
-    there = placed.placement.transform.apply(feet)
+    there = run.placement.apply(feet)
     return [
         TouchOff(int(row), *values) for row, *values in zip(rows.tolist(), feet, there, tips, axes, legs, strict=True)
     ]
@@ -76,12 +73,12 @@ def _numbers(values: Floats, digits: int) -> str:
     return ", ".join(f"{round(value, digits) + 0.0:.{digits}f}".replace("-", "−") for value in values.tolist())
 
 
-def _spread(placed: PlacedPath, count: int) -> Ints:
+def _spread(run: PlannedRun, count: int) -> Ints:
     """Return waypoints (k,) on cuts that are far from each other: the first far from the middle."""
-    toolpath = placed.toolpath
+    toolpath = run.toolpath
     kinds = np.array([toolpath.segments[k].kind is SegmentKind.CUT for k in toolpath.segment_of_interval])
     rows = np.flatnonzero(kinds)
-    points = placed.tilt_centres[rows]
+    points = run.tips[rows] + toolpath.tilt_centre * run.axes[rows]
     if len(rows) < count:
         return rows[:0]
     chosen: list[int] = []

@@ -1,0 +1,249 @@
+"""Paper: a drawing in SVG whose letters keep their size, with dimensions, and labels that do not lie on each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from html import escape
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+
+LETTER = 11.0
+"""Height of letters, in units of the drawing; a unit is a CSS pixel where the drawing is as wide as it was made."""
+
+LETTER_WIDTH = 0.6
+"""Width of a letter as a share of its height, rather too much."""
+
+ARROW = 6.0
+"""Length of an arrow's head."""
+
+Box = tuple[float, float, float, float]
+Place = tuple[float, float, str]
+"""Where a label may stand: x and y of its base line, and which point of it that is ("start", "middle", "end")."""
+
+_HALO = "paint-order:stroke;stroke:var(--sheet,#fff);stroke-width:3px;stroke-linejoin:round"
+
+
+@dataclass(frozen=True)
+class Rooms:
+    """Room around what is drawn, for dimensions: left, above, right, below."""
+
+    left: float = 22.0
+    above: float = 18.0
+    right: float = 66.0
+    below: float = 40.0
+
+
+@dataclass
+class Paper:
+    """A drawing `width` by `height` of the plane region low..high (2,), mm, to the right and upwards."""
+
+    low: Floats
+    high: Floats
+    width: float = 350.0
+    height: float = 280.0
+    rooms: Rooms = field(default_factory=Rooms)
+    parts: list[str] = field(default_factory=list[str])
+    taken: list[Box] = field(default_factory=list[Box])
+
+    @property
+    def scale(self) -> float:
+        """Units of the drawing for a millimetre."""
+        rooms = self.rooms
+        free = np.array([self.width - rooms.left - rooms.right, self.height - rooms.above - rooms.below])
+        return float((free / np.maximum(self.high - self.low, 1e-9)).min())
+
+    def at(self, points: Floats | Sequence[float]) -> Floats:
+        """Return the places on the drawing of points (..., 2)."""
+        rooms = self.rooms
+        middle = np.array([
+            0.5 * (rooms.left + self.width - rooms.right), 0.5 * (rooms.above + self.height - rooms.below),
+        ])  # fmt: skip
+        offset = np.asarray(points, dtype=np.float64) - 0.5 * (self.low + self.high)
+        return middle + self.scale * offset * (1.0, -1.0)
+
+    def line(self, points: Floats, colour: str = "currentColor", width: float = 1.0, more: str = "") -> None:
+        """Draw a line through points (K, 2), mm."""
+        self._path(_lines([self.at(points)]), colour, width, f'fill="none" {more}')
+
+    def lines(self, lines: Iterable[Floats], colour: str, width: float) -> None:
+        """Draw lines (K, 2), mm, as one."""
+        if path := _lines([self.at(line) for line in lines]):
+            self._path(path, colour, width, 'fill="none"')
+
+    def area(self, lines: Iterable[Floats], colour: str, name: str) -> None:
+        """Fill what is within closed lines (K, 2), mm, holes left open, and draw its border."""
+        if path := _lines([self.at(line) for line in lines], close="Z"):
+            more = f'fill="{colour}" fill-opacity="0.3" fill-rule="evenodd"'
+            self._path(path, "currentColor", 1.1, more, f"<title>{escape(name)}</title>")
+
+    def stroke(self, path: str, width: float = 0.8, colour: str = "currentColor") -> None:
+        """Draw an SVG path in units of the drawing."""
+        self._path(path, colour, width, 'fill="none"')
+
+    def ball(self, point: Floats, text: str, colour: str, ink: str = "#fff") -> None:
+        """Draw a disc with a number, and keep labels off it."""
+        (x, y), radius = self.at(point), 0.65 * LETTER
+        self.parts.append(
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{colour}" stroke="{ink}" stroke-width="0.8"/>'
+            f'<text x="{x:.1f}" y="{y + 0.34 * LETTER:.1f}" font-size="{0.9 * LETTER:.1f}" font-weight="600" '
+            f'text-anchor="middle" fill="{ink}">{escape(text)}</text>'
+        )
+        self.keep((x - radius, y - radius, x + radius, y + radius))
+
+    def keep(self, box: Box) -> None:
+        """Keep labels off a box: left, upper, right, lower edge."""
+        self.taken.append(box)
+
+    def label(self, text: str, places: Sequence[Place], kind: str = "label") -> None:
+        """Write a text at the first of some places where it lies on no other and within the drawing."""
+        boxes = [_box(place, text) for place in places]
+        free = [k for k, box in enumerate(boxes) if self._is_free(box)]
+        best = free[0] if free else min(range(len(boxes)), key=lambda k: self._hidden(boxes[k]))
+        (x, y, anchor), box = places[best], boxes[best]
+        self.keep(box)
+        self.parts.append(
+            f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}" font-size="{LETTER:g}" text-anchor="{anchor}" '
+            f'fill="currentColor" style="{_HALO}">{escape(text)}</text>'
+        )
+
+    def label_at(self, point: Floats, text: str, kind: str = "label") -> None:
+        """Write a text beside a point, mm."""
+        x, y = self.at(point)
+        side, off = 9.0, 0.36 * LETTER
+        near = [
+            (x + side, y + off, "start"), (x - side, y + off, "end"), (x + side, y - side, "start"),
+            (x - side, y - side, "end"), (x + side, y + side + LETTER, "start"), (x - side, y + side + LETTER, "end"),
+            (x, y - 12.0, "middle"), (x, y + 12.0 + LETTER, "middle"),
+        ]  # fmt: skip
+        self.label(text, [*near, *((a, b + step, c) for step in (26.0, -26.0, 52.0, -52.0) for a, b, c in near)], kind)
+
+    def datum(self, point: Floats) -> None:
+        """Draw the mark of a datum: a circle in quarters."""
+        (x, y), r = self.at(point), 5.5
+        self.parts.append(
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{r}" fill="var(--sheet,#fff)" stroke="currentColor"/>'
+            f'<path d="M{x:.1f} {y:.1f}V{y - r:.1f}A{r} {r} 0 0 1 {x + r:.1f} {y:.1f}Z'
+            f'M{x:.1f} {y:.1f}V{y + r:.1f}A{r} {r} 0 0 1 {x - r:.1f} {y:.1f}Z" fill="currentColor"/>'
+        )
+        self.keep((x - r, y - r, x + r, y + r))
+
+    def arrow(self, point: Floats, along: Floats, length: float, text: str) -> None:
+        """Draw an arrow of a length in units of the drawing from a point, mm, with a label at its head."""
+        reach = float(np.linalg.norm(along))
+        if reach < 0.15:  # it points to the viewer
+            return
+        (x, y), (dx, dy) = self.at(point), length * along * (1.0, -1.0)
+        self.stroke(f"M{x:.1f} {y:.1f}L{x + dx:.1f} {y + dy:.1f}", 1.2)
+        self.parts.append(_head(x + dx, y + dy, dx, dy))
+        ux, uy = dx / (reach * length), dy / (reach * length)
+        places = [
+            (x + dx + far * ux, y + dy + far * uy + 0.36 * LETTER, "middle") for far in (9.0, 16.0, 24.0)
+        ]  # fmt: skip
+        self.label(text, places)
+
+    def across(self, start: Floats, end: Floats, text: str, ends: tuple[str, str] | None = None) -> None:
+        """Draw the dimension from one point to another to the right, below the drawing. ends: what is there, as text."""
+        (ax, ay), (bx, by) = sorted((self.at(start).tolist(), self.at(end).tolist()))
+        y = self.height - self.rooms.below + 16.0
+        self.stroke(f"M{ax:.1f} {ay + 3:.1f}V{y + 3:.1f}M{bx:.1f} {by + 3:.1f}V{y + 3:.1f}", 0.5)
+        self._measure((ax, y), (bx, y))
+        middle, low = 0.5 * (ax + bx), y - 4.0
+        self.label(text, [(middle, low, "middle"), (bx + 5, y + 4, "start"), (ax - 5, y + 4, "end"),
+                          (middle, y + 1.2 * LETTER, "middle")], "dimension")  # fmt: skip
+        if ends is not None:
+            for text, x, anchor in ((ends[0], ax, "end"), (ends[1], bx, "start")):
+                places = [(x, y + 1.4 * LETTER, kind) for kind in ("middle", anchor)]
+                self.label(text, [*places, (x, y + 2.4 * LETTER, anchor)], "coordinate")
+
+    def upright(self, start: Floats, end: Floats, text: str, ends: tuple[str, str] | None = None) -> None:
+        """Draw the dimension upwards from one point to another, right of the drawing. ends: of the lower, the upper."""
+        (ax, ay), (bx, by) = sorted((self.at(start).tolist(), self.at(end).tolist()), key=lambda p: -p[1])
+        x = self.width - self.rooms.right + 12.0
+        self.stroke(f"M{ax + 3:.1f} {ay:.1f}H{x + 3:.1f}M{bx + 3:.1f} {by:.1f}H{x + 3:.1f}", 0.5)
+        self._measure((x, ay), (x, by))
+        side, off = x + 5.0, 0.36 * LETTER
+        middle = 0.5 * (ay + by) + off
+        if ends is not None:
+            for text_there, y, step in ((ends[0], ay, LETTER), (ends[1], by, -LETTER)):
+                places = [(side, y + off + k * step, "start") for k in (0.0, 0.5, 1.0, 1.5, 2.0)]
+                self.label(text_there, places, "coordinate")
+        steps = (0.0, LETTER, -LETTER, 2.4 * LETTER, -2.4 * LETTER, 3.6 * LETTER, -3.6 * LETTER)
+        self.label(text, [(side, middle + step, "start") for step in steps], "dimension")
+
+    def svg(self, title: str, caption: str) -> str:
+        """Return the drawing as a <figure>. title: for those who do not see it."""
+        return (
+            f'<figure class="drawing"><svg viewBox="0 0 {self.width:g} {self.height:g}" role="img" '
+            f'aria-label="{escape(title)}">{"".join(self.parts)}</svg>'
+            f'<figcaption class="caption">{escape(caption)}</figcaption></figure>'
+        )
+
+    def _measure(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Draw the line of a dimension with its arrows; they point inwards where there is no room between them."""
+        (ax, ay), (bx, by) = start, end
+        dx, dy = bx - ax, by - ay
+        length = float(np.hypot(dx, dy))
+        ux, uy = (dx / length, dy / length) if length > 0.0 else (1.0, 0.0)
+        if length > 2.5 * ARROW:
+            self.stroke(f"M{ax:.1f} {ay:.1f}L{bx:.1f} {by:.1f}")
+            self.parts += [_head(bx, by, ux, uy), _head(ax, ay, -ux, -uy)]
+        else:
+            out = 2.0 * ARROW
+            self.stroke(f"M{ax - out * ux:.1f} {ay - out * uy:.1f}L{bx + out * ux:.1f} {by + out * uy:.1f}")
+            self.parts += [_head(bx, by, -ux, -uy), _head(ax, ay, ux, uy)]
+
+    def _path(self, path: str, colour: str, width: float, more: str, inner: str = "") -> None:
+        pen = f'stroke="{colour}" stroke-width="{width:g}" stroke-linejoin="round" stroke-linecap="round"'
+        self.parts.append(f'<path d="{path}" {pen} {more}>{inner}</path>' if inner else f'<path d="{path}" {pen} {more}/>')
+
+    def _is_free(self, box: Box) -> bool:
+        inside = box[0] >= 1.0 and box[1] >= 0.0 and box[2] <= self.width - 1.0 and box[3] <= self.height
+        return inside and all(_common(box, other) <= 0.0 for other in self.taken)
+
+    def _hidden(self, box: Box) -> float:
+        frame = (0.0, 0.0, self.width, self.height)
+        return sum(_common(box, other) for other in self.taken) + 4.0 * (_size(box) - _common(box, frame))
+
+
+def _box(place: Place, text: str) -> Box:
+    x, y, anchor = place
+    wide = LETTER_WIDTH * LETTER * len(text)
+    left = x - {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor] * wide
+    return (left, y - 0.85 * LETTER, left + wide, y + 0.25 * LETTER)
+
+
+def _size(box: Box) -> float:
+    return (box[2] - box[0]) * (box[3] - box[1])
+
+
+def _common(a: Box, b: Box) -> float:
+    """Return the area that two boxes have in common."""
+    wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+    return max(wide, 0.0) * max(high, 0.0)
+
+
+def _head(x: float, y: float, dx: float, dy: float) -> str:
+    """Return an arrow's head at a place, pointing along (dx, dy)."""
+    length = max(float(np.hypot(dx, dy)), 1e-9)
+    ux, uy = ARROW * dx / length, ARROW * dy / length
+    a, b = (x - ux - 0.3 * uy, y - uy + 0.3 * ux), (x - ux + 0.3 * uy, y - uy - 0.3 * ux)
+    return f'<path d="M{x:.1f} {y:.1f}L{a[0]:.1f} {a[1]:.1f}L{b[0]:.1f} {b[1]:.1f}Z" fill="currentColor"/>'
+
+
+def _lines(lines: Sequence[Floats], close: str = "") -> str:
+    """Return an SVG path of lines (K, 2): where each begins, then the way from point to point, in tenths of a unit."""
+    texts: list[str] = []
+    for line in lines:
+        places = np.round(10.0 * line).astype(np.int64)
+        keep = np.concatenate([[True], (np.diff(places, axis=0) != 0).any(axis=1)])
+        if int(keep.sum()) < 2:
+            continue
+        places = places[keep]
+        steps = np.diff(places, axis=0) / 10.0
+        start = places[0] / 10.0
+        way = "".join(f"{dx:g} {dy:g} " if dy >= 0 else f"{dx:g}{dy:g} " for dx, dy in steps.tolist())
+        texts.append(f"M{start[0]:g} {start[1]:g}l{way.strip()}{close}")
+    return "".join(texts)
