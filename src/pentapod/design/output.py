@@ -17,7 +17,7 @@ from pentapod.design.members import MACHINE, Front, Member
 from pentapod.design.quantities import QUANTITIES, Quantity
 from pentapod.job.artefacts import REPORT
 from pentapod.report.figure import LIMIT_COLOUR, QUIET_COLOUR
-from pentapod.report.placement_views import machine_views
+from pentapod.report.sheet.views import machine_drawings
 from pentapod.report.template import write_page
 from pentapod.report.words import number
 
@@ -142,7 +142,7 @@ def _shown(front: Front, number_: int, member: Member) -> dict[str, Any]:
         "folder": folder_of(number_),
         "headline": headline(front, member),
         "proof": f"proven by {member.boxes:,} boxes of poses",
-        "views": machine_views(member.loaded()),
+        "views": machine_drawings(member.loaded()),
         "parts": [(f"{part.job}: {part.said}", f"{part.folder}/{REPORT}") for part in member.parts],
     }
 

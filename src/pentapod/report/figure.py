@@ -38,8 +38,7 @@ class Detail:
 
     poses: of the slider. margin_rows: rows of the program with margins. time_buckets, simulation_buckets,
     path_buckets: of a curve against time, of a simulation, of the path; each keeps four points. margin_curves: margins
-    plotted. facets, edges: of a mesh in 3D. view_facets, view_points: of mesh and path in the drawings of the set-up
-    sheet. band_columns: of the band of margins. limits: rows of the table of limits.
+    plotted. facets, edges: of a mesh in 3D. band_columns: of the band of margins. limits: rows of the table of limits.
     """
 
     poses: int = 240
@@ -50,8 +49,6 @@ class Detail:
     margin_curves: int = 6
     facets: int = 60_000
     edges: int = 5000
-    view_facets: int = 1200
-    view_points: int = 1500
     band_columns: int = 480
     limits: int = 10
 

@@ -6,31 +6,25 @@ from html import escape
 
 from pentapod.base.units import from_si
 from pentapod.job.outcome import Outcome
-from pentapod.mesh.mesh import Mesh
 from pentapod.planning.diagnosis import ActiveLimit, active_limits
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.report.figure import DETAIL
-from pentapod.report.held import held_mesh
 from pentapod.report.margin_band import margin_band
-from pentapod.report.placement_views import placement_views
+from pentapod.report.sheet.planned_run import PlannedRun
 from pentapod.report.sheet.touch_off import touch_off_points, touch_off_table
+from pentapod.report.sheet.views import all_drawings
 from pentapod.report.words import number
 
 
 def setup_sheet(outcome: Outcome) -> str:
     """Return the sheet as HTML, for the section on the placement; empty where no placement was found."""
-    placed = outcome.find(PlacedPath)
-    if placed is None:
+    placed, run = outcome.find(PlacedPath), PlannedRun.of(outcome)
+    if placed is None or run is None:
         return ""
-    table = outcome.job.placement
-    height = table.table_z_mm if table.mode == "table" else None
-    surface = None if height is None else 1e-3 * height
-    held, mesh = held_mesh(outcome, placed), outcome.find(Mesh)
-    views = placement_views(mesh, placed, outcome.machine, surface, held)
-    points = "" if mesh is None else touch_off_table(touch_off_points(mesh, placed, outcome.machine))
+    points = touch_off_table(touch_off_points(run))
     rows = "".join(_row(limit) for limit in active_limits(placed)[: DETAIL.limits])
     return (
-        f'<p>{_standing(mesh, placed, outcome, height)}</p><div class="views">{views}</div>{points}'
+        f'<p>{_standing(run)}</p><div class="views">{all_drawings(run)}</div>{points}'
         f"<h3>Margins along the path</h3>{margin_band(placed.tips, placed.margins, placed.margin_names)}"
         '<p class="hint">Height: the smallest margin (0: a limit, about 1: comfortable). Colour: the nearest limit; '
         "point at it for its name.</p>"
@@ -40,15 +34,13 @@ def setup_sheet(outcome: Outcome) -> str:
     )
 
 
-def _standing(mesh: Mesh | None, placed: PlacedPath, outcome: Outcome, height: float | None) -> str:
+def _standing(run: PlannedRun) -> str:
     """Return where the table is, or where it would have to be."""
-    if height is not None:
-        return f"The part stands on the table, at z = {number(height, 'mm')}."
-    if mesh is None:
-        return ""
-    z = placed.placement.transform.apply(mesh.vertices)[:, 2]
-    far = from_si(float(z.max() if outcome.machine.work.centre[2] > 0.0 else z.min()), "mm")
-    return f"The lowest point of the part is at z = {number(far, 'mm')}: a table must not be higher."
+    if run.table is not None:
+        return f"The part stands on the table, at z = {number(from_si(run.table, 'mm'), 'mm')}."
+    return (
+        f"The lowest point of the part is at z = {number(from_si(run.lowest, 'mm'), 'mm')}: a table must not be higher."
+    )
 
 
 def _row(limit: ActiveLimit) -> str:

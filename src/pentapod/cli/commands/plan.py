@@ -42,7 +42,7 @@ def plan(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Plan JOB.toml: write program.csv, verdict.json, report.html and plan.npz.
+    """Plan JOB.toml: write program.csv, verdict.json, report.html, sheet.html and plan.npz.
 
     The folder changes only when the run ends, so that its files are always of one run. A job that cannot be done leaves
     no program.csv, nor does a program that fails its verdict: that one is called withheld.csv. Changes of a job that
@@ -118,7 +118,7 @@ def _planned(path: Path, asked: Asked) -> tuple[int, dict[str, Any] | None]:
 
     from pentapod.job.advice.options import AdviceOptions
     from pentapod.job.advice_on_errors import can_help
-    from pentapod.job.artefacts import REPORT
+    from pentapod.job.artefacts import REPORT, SHEET
     from pentapod.job.pipeline import run
 
     options = None if asked.advice == 0 else AdviceOptions(wanted=asked.advice or 1)
@@ -128,7 +128,9 @@ def _planned(path: Path, asked: Asked) -> tuple[int, dict[str, Any] | None]:
         job = placed_job(job, read_placement(asked.placement), asked.out)
     try:
         with progress_bar(quiet=asked.quiet or asked.as_json) as progress:
-            outcome = run(job, asked.out, progress, writers={REPORT: _write_report}, advice=options)
+            outcome = run(
+                job, asked.out, progress, writers={REPORT: _write_report, SHEET: _write_sheet}, advice=options
+            )
     except InputError as error:
         if options is None or not can_help(error) or (asked.advice is None and error.key == "part.unit"):
             raise
@@ -141,7 +143,7 @@ def shown(
     outcome: Outcome, out: Path, *, explain: bool, as_json: bool, quiet: bool
 ) -> tuple[int, dict[str, Any] | None]:
     """Print the outcome of a run in a folder, as text; return the exit code, and what JSON says."""
-    from pentapod.job.artefacts import PROGRAM, REPORT
+    from pentapod.job.artefacts import PROGRAM, REPORT, SHEET
     from pentapod.job.outcome import SetUps
     from pentapod.planning import PlacedPath
     from pentapod.planning.diagnosis import active_limits
@@ -165,6 +167,8 @@ def shown(
             folders = [out] if setups is None else [out / part.folder for part in setups.parts]
             click.echo("\n".join(f"program: {folder / PROGRAM}" for folder in folders))
         click.echo(f"report: {out / REPORT}")
+        if refusal is None:
+            click.echo(f"set-up sheet: {out / SHEET}")
     if refusal is not None:
         click.echo(f"refused: {refusal}", err=True)
         click.echo(advice_text(refusal.advice), err=True, nl=bool(refusal.advice))
@@ -177,6 +181,12 @@ def _write_report(outcome: Outcome, file: Path) -> None:
     from pentapod.report import write_report
 
     write_report(outcome, file)
+
+
+def _write_sheet(outcome: Outcome, file: Path) -> None:
+    from pentapod.report import write_sheet
+
+    write_sheet(outcome, file)
 
 
 def _advised(job: Job, options: AdviceOptions, *, as_json: bool, quiet: bool) -> tuple[int, dict[str, Any] | None]:

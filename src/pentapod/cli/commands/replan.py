@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from pentapod.cli.commands.plan import shown
 from pentapod.cli.output import echo_json, json_option, quiet_option
 from pentapod.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from pentapod.job.stages import Writer
 
 
 @click.command()
@@ -26,14 +30,15 @@ def replan(folder: Path, placement: Path, out: Path | None, explain: bool, as_js
     margin is too small at the new placement, all is planned anew. Writes the files of `plan`, and the job of the run,
     placed-job.toml, against which `verify` judges it.
     """
-    from pentapod.job.artefacts import REPORT
+    from pentapod.job.artefacts import REPORT, SHEET
     from pentapod.job.clamped.replan import FOLDER
     from pentapod.job.clamped.replan import replan as planned_again
-    from pentapod.report import write_report
+    from pentapod.report import write_report, write_sheet
 
+    writers: dict[str, Writer] = {REPORT: write_report, SHEET: write_sheet}
     target = folder / FOLDER if out is None else out
     with progress_bar(quiet=quiet or as_json) as progress:
-        outcome = planned_again(folder, placement, target, progress, writers={REPORT: write_report})
+        outcome = planned_again(folder, placement, target, progress, writers=writers)
     code, content = shown(outcome, target, explain=explain, as_json=as_json, quiet=quiet)
     if content is not None:
         echo_json(content)

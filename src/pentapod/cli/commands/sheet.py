@@ -48,6 +48,7 @@ def sheet(folder: Path, job: Path | None, out: Path | None, as_json: bool, quiet
 def sheet_pages(folder: Path, job: Path | None, progress: Progress) -> list[SheetPage]:
     """Return the pages of the run in a folder, one for each set-up. Raises InputError as `open_run`, and `_page`."""
     from pentapod.job.outcome import SetUp
+    from pentapod.report.sheet.page import setup_name
     from pentapod.view import open_run
 
     parts: list[Path] = []
@@ -55,8 +56,8 @@ def sheet_pages(folder: Path, job: Path | None, progress: Progress) -> list[Shee
         parts.append(part)
     pages: list[SheetPage] = []
     for part in parts or [folder]:
-        name = f"set-up {len(pages) + 1} of {len(parts)}" if parts else ""
-        pages.append(_page(part, name, open_run(part, job, progress)))
+        run = open_run(part, job, progress)
+        pages.append(_page(part, "" if run.piece is None else setup_name(part), run))
     return pages
 
 
@@ -73,13 +74,17 @@ def _page(folder: Path, name: str, run: OpenedRun) -> SheetPage:
     if program is None:
         withheld = (folder / WITHHELD).is_file()
         what = "the program fails its own verdict and was withheld" if withheld else "the job was refused"
-        raise InputError(f"no set-up sheet: {what}", file=folder, remedy="report.html says why; change the job, plan again")
+        raise InputError(
+            f"no set-up sheet: {what}", file=folder, remedy="report.html says why; change the job, plan again"
+        )
     made_for, remedy = program.provenance, "plan the job again"
     if not run.same_job:
         raise InputError("the job or its part was changed since this run", file=run.job.path, remedy=remedy)
     if made_for.machine_digest != run.machine.digest:
         what = "the machine was changed since this run"
-        raise InputError(what, file=run.job.path, value=run.machine.digest, expected=made_for.machine_digest, remedy=remedy)
+        raise InputError(
+            what, file=run.job.path, value=run.machine.digest, expected=made_for.machine_digest, remedy=remedy
+        )
     names = ("trajectory.time_s", "trajectory.station_mm", "placed.tips_mm", "placed.axes", "placed.margins")
     arrays = read_arrays(folder / ARRAYS, names, InputError)
     clock = arrays["trajectory.time_s"], 1e-3 * arrays["trajectory.station_mm"]

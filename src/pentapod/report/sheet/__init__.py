@@ -1,1 +1,1 @@
-"""What the set-up sheet draws and lists beside the views: dimension lines, touch-off points."""
+"""The set-up sheet: drawings with dimensions, touch-off points, numbers, and the page that is printed."""

@@ -11,6 +11,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.units import from_si
 from pentapod.cutters.mounted import Mounted
 from pentapod.geometry.polyline import arc_length
+from pentapod.geometry.solids import Cone
 from pentapod.report import words
 from pentapod.report.sheet.planned_run import PlannedRun
 from pentapod.report.sheet.touch_off import TouchOff
@@ -36,29 +37,30 @@ class Row:
 
 @dataclass(frozen=True)
 class PoseRow:
-    """A row of the table of poses, as text: tip, mm; tool axis; legs, mm; where the part is touched, mm."""
+    """A row of the table of poses, as text: tip, legs, where the part is touched; mm."""
 
     name: str
     tip: str
-    axis: str
     legs: str
     touches: str
 
 
 def tool_facts(run: PlannedRun) -> list[Fact]:
     """Return names and values of the tool: what to put into the spindle, and how far it must stick out."""
-    job, machine, tool = run.job, run.machine, run.tool
+    job, machine, tool, program = run.job, run.machine, run.tool, run.program
     facts = [("tool", words.tool_sentence(job.tool))]
-    facts.append(("stick-out", f"{_mm(machine.bodies.shaft_end)} mm from the spindle's nose to the tip"))
-    facts.append(("tool length", f"{_mm(machine.tool_length, 3)} mm from the platform's origin to the tip"))
+    facts.append(("stick-out", f"{_mm(machine.bodies.shaft_end)}, spindle's nose to tip"))
+    facts.append(("length", f"{_mm(machine.tool_length, 3)}, platform's origin to tip"))
     if isinstance(tool, Mounted):
         for kind, pieces in (("shank", tool.shank), ("holder", tool.holder)):
             if pieces:
-                texts = [f"{_mm(p.height)} long, ⌀ {_mm(2 * p.lower_radius)} to {_mm(2 * p.upper_radius)}" for p in pieces]
-                facts.append((kind, "; ".join(texts) + " mm"))
+                texts = [_piece(p) for p in pieces]
+                facts.append((kind, "; ".join(texts)))
         if tool.stem is not None:
             wide = 2.0 * max(solid.largest_radius for solid in tool.solids)
-            facts.append(("stem", f"not given: ⌀ {_mm(wide)} mm is assumed up to the spindle. Thicker is not checked."))
+            facts.append(("stem", f"not given: ⌀ {_mm(wide)} assumed up to the spindle"))
+    if program is not None and program.rail_positions is not None:
+        facts.append(("guides", ", ".join(words_of(1e3 * x, 3) for x in program.rail_positions)))
     return facts
 
 
@@ -66,49 +68,40 @@ def stand_facts(run: PlannedRun) -> list[Fact]:
     """Return names and values of how the part stands and on what."""
     stand, job = run.stand, run.job
     size = " × ".join(_mm(value, 1) for value in np.ptp(run.mesh.bounds, axis=0))
-    facts = [("part", f"{job.mesh_path.name}, {size} mm"), ("datum", "the origin of the mesh, with its axes X, Y, Z")]
-    where = ", ".join(words_of(value) for value in 1e3 * run.placement.translation)
-    facts.append(("datum at", f"x, y, z = {where} mm"))
-    facts.append(("turn", f"{stand.turned.upper()} of the part points to {words_of(np.degrees(stand.turn), 2)}° in plan"))
+    facts = [("part", f"{job.mesh_path.name}, {size}"), ("datum", "origin of the mesh; X, Y, Z are its axes")]
+    x, y, z = (words_of(value) for value in 1e3 * run.placement.translation)
+    facts.append(("at", f"x {x}, y {y}, z {z}"))
+    facts.append(
+        ("turn", f"{stand.turned.upper()} points to {words_of(np.degrees(stand.turn), 2)}° (0° is x, 90° is y)")
+    )
     if run.table is not None:
-        facts.append(("table", f"surface at z = {words_of(1e3 * run.table)} mm; the part stands flat on it"))
+        facts.append(("table", f"surface at z {words_of(1e3 * run.table)}; the part stands flat on it"))
     else:
-        facts.append(("table", f"no higher than z = {words_of(1e3 * run.lowest)} mm, the part's lowest point"))
+        facts.append(("table", f"none given; the part goes down to z {words_of(1e3 * run.lowest)}"))
     if stand.is_tilted:
         azimuth = words_of(np.degrees(stand.azimuth), 1)
-        facts.append(
-            ("wedge", f"{words_of(np.degrees(stand.lean))}°; the part leans to {azimuth}° in plan, its low side")
-        )
+        facts.append(("wedge", f"{words_of(np.degrees(stand.lean))}°, low side towards {azimuth}°"))
     if run.held is not None:
         facts.append(("fixture", f"{job.fixture_mesh.name if job.fixture_mesh else ''}, as drawn"))
     return facts
 
 
-def machine_facts(run: PlannedRun) -> list[Fact]:
-    """Return names and values of the machine and the program."""
-    machine, program = run.machine, run.program
-    facts = [("machine", f"{machine.name}, {machine.digest}")]
-    if machine.calibration_name:
-        facts.append(("calibration", machine.calibration_name))
-    if program is not None and program.rail_positions is not None:
-        guides = ", ".join(words_of(1e3 * x, 3) for x in program.rail_positions)
-        facts.append((f"guides 1 to {machine.robot.n_legs}", f"{guides} mm"))
-    if program is not None:
-        facts.append(("program", f"{len(program.legs):,} rows, one each {1e3 * program.period:g} ms"))
-    if run.margin is not None:
-        facts.append(("smallest margin", f"{words.number(run.margin)} (0: a limit, about 1: comfortable)"))
-    return facts
+def machine_sentence(run: PlannedRun) -> str:
+    """Return the machine, its calibration, and the file of the program."""
+    machine = run.machine
+    calibrated = f", calibration {machine.calibration_name}" if machine.calibration_name else ""
+    return f"Machine {machine.name} ({machine.digest}{calibrated})."
 
 
 def poses(run: PlannedRun, points: Sequence[TouchOff]) -> list[PoseRow]:
     """Return rows of poses: the first, those at touch-off points, the last, and home."""
     touches = [
-        PoseRow(f"touch-off {k}", _list(1e3 * p.tip, 2), _list(p.axis, 4), _list(1e3 * p.legs, 3), _list(1e3 * p.in_machine, 2))
+        PoseRow(f"touch-off {k}", _list(1e3 * p.tip, 2), _list(1e3 * p.legs, 3), _list(1e3 * p.in_machine, 2))
         for k, p in enumerate(points, start=1)
     ]
     first, last, home = (
-        PoseRow(name, _list(1e3 * p.tip, 2), _list(p.axis, 4), _list(1e3 * p.legs, 3), "")
-        for name, p in (("first", run.first), ("last", run.last), ("home", run.home))
+        PoseRow(name, _list(1e3 * p.tip, 2), _list(1e3 * p.legs, 3), "")
+        for name, p in (("start", run.first), ("end", run.last), ("home", run.home))
     )
     return [first, *touches, last, home]
 
@@ -124,14 +117,16 @@ def cycle(run: PlannedRun) -> list[Row]:
     for kind, name in OPERATIONS.items():
         here = np.array([s.kind is kind for s in segments])
         if here.any():
-            feeds = sorted({min(s.feed, run.machine.rapid_velocity) for s, own in zip(segments, here, strict=True) if own})
+            feeds = sorted(
+                {min(s.feed, run.machine.rapid_velocity) for s, own in zip(segments, here, strict=True) if own}
+            )
             feed = ", ".join(f"{6e4 * value:,.0f}" for value in feeds[:3]) + (", …" if len(feeds) > 3 else "")
             rows.append(_row(name, int(here.sum()), float(lengths[here].sum()), feed, float(times[here].sum())))
     rows.append(_row("all", len(segments), float(lengths.sum()), "", program.duration))
     return rows
 
 
-def checks(run: PlannedRun, digest: str | None) -> list[str]:
+def checks(run: PlannedRun, digest: str) -> list[str]:
     """Return what the operator has to check before the start. digest: SHA-256 of the program's file."""
     done = ["Machine referenced; no alarm."]
     if run.program is not None and run.program.rail_positions is not None:
@@ -143,14 +138,18 @@ def checks(run: PlannedRun, digest: str | None) -> list[str]:
     done.append("Clamps outside the tool path, and below the legs." + (" Fixture as drawn." if run.held else ""))
     done.append("Three touch-off points agree; else: pentapod register, replan.")
     done.append("Way from the present pose to the first one is free.")
-    if digest is not None:
-        done.append(f"SHA-256 of program.csv begins with {digest[:12]}.")
+    done.append(f"SHA-256 of program.csv begins with {digest[:12]}.")
     done.append("Dry run above the part, feed override at 10 %; hand at the stop.")
     return done
 
 
 def _row(what: str, count: int, length: float, feed: str, seconds: float) -> Row:
     return Row(what, f"{count:,}", f"{1e3 * length:,.0f}", feed, words.duration(seconds))
+
+
+def _piece(cone: Cone) -> str:
+    low, high = _mm(2.0 * cone.lower_radius), _mm(2.0 * cone.upper_radius)
+    return f"{_mm(cone.height)} long, ⌀ {low if low == high else f'{low} to {high}'}"
 
 
 def _mm(value: float, digits: int = 4) -> str:

@@ -127,10 +127,11 @@ class _Seen:
         places = flat[edge, 0] + share * (flat[edge, 1] - flat[edge, 0])
         depths = edges[edge, 0, 2] + share[:, 0] * (edges[edge, 1, 2] - edges[edge, 0, 2])
         # The nearest facet counts where all cells around are in front: a line is at the end of the surface beside it.
-        inside = minimum_filter(self.covered, 3)
-        around = minimum_filter(self.nearest, 3)
+        inside: Bools = np.asarray(minimum_filter(self.covered, 3))
+        around: Floats = np.asarray(minimum_filter(self.nearest, 3))
         column, row = (np.clip(places[:, k].astype(np.intp), 0, self.covered.shape[1 - k] - 1) for k in (0, 1))
-        on_border = ~inside[row, column] & maximum_filter(self.covered, 3)[row, column]
+        beside: Bools = np.asarray(maximum_filter(self.covered, 3))
+        on_border = ~inside[row, column] & beside[row, column]
         seen = (depths >= around[row, column] - 1e-9) & ~on_border
         # Pieces of an edge that follow each other are one part.
         begins = seen & np.concatenate([[True], ~seen[:-1] | (edge[1:] != edge[:-1])])[: len(seen)]

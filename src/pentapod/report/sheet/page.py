@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from pentapod.base.errors import InputError
 from pentapod.base.files import atomic_write, sha256_of
 from pentapod.base.version import __version__
 from pentapod.job.artefacts import PROGRAM
@@ -16,6 +15,7 @@ from pentapod.report.sheet import facts
 from pentapod.report.sheet.planned_run import PlannedRun
 from pentapod.report.sheet.touch_off import touch_off_points
 from pentapod.report.sheet.views import all_drawings
+from pentapod.toolpath.linking.partition import Piece
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,9 +26,9 @@ class SheetPage:
     """
 
     run: PlannedRun
-    name: str = ""
-    digest: str | None = None
-    passed: bool = True
+    name: str
+    digest: str
+    passed: bool
 
 
 def sheet_html(pages: Sequence[SheetPage]) -> str:
@@ -51,28 +51,34 @@ def write_pages(pages: Sequence[SheetPage], path: str | Path) -> Path:
     return Path(path)
 
 
-def write_sheet(outcome: Outcome, path: str | Path) -> Path:
+def write_sheet(outcome: Outcome, path: str | Path) -> Path | None:
     """Write the set-up sheet of an outcome, a page for each set-up, and return its path.
 
-    The files of the run are beside it. Raises InputError where the outcome has no program, or it cannot be written.
+    The files of the run are beside it. Nothing is written, and None returned, where a program is missing. Raises
+    InputError where it cannot be written.
     """
-    if not (pages := pages_of(outcome, Path(path).parent)):
-        raise InputError("no set-up sheet without a program", value=str(outcome.refusal), remedy="plan a job that can be done")
-    return write_pages(pages, path)
+    pages = _pages(outcome, Path(path).parent)
+    return write_pages(pages, path) if pages else None
 
 
-def pages_of(outcome: Outcome, folder: Path) -> list[SheetPage]:
-    """Return the pages of an outcome whose files are in a folder; none where it has no program."""
+def setup_name(folder: Path) -> str:
+    """Return what the page of a set-up that has a folder of its own is called."""
+    return folder.name.replace("-", " ").replace("setup", "set-up")
+
+
+def _pages(outcome: Outcome, folder: Path) -> list[SheetPage]:
+    """Return the pages of an outcome whose files are in a folder; none where a program is missing."""
     setups = outcome.find(SetUps)
-    parts = [("", outcome, folder)] if setups is None else [
-        (f"set-up {part.number} of {len(setups.parts)}", part.outcome, folder / part.folder) for part in setups.parts
-    ]  # fmt: skip
+    if setups is None:
+        parts = [(setup_name(folder) if outcome.find(Piece) else "", outcome, folder)]
+    else:
+        parts = [(setup_name(folder / part.folder), part.outcome, folder / part.folder) for part in setups.parts]
     pages: list[SheetPage] = []
     for name, part, where in parts:
         run, file = PlannedRun.of(part), where / PROGRAM
-        if run is None or run.program is None or part.refusal is not None:
+        if run is None or not file.is_file():
             return []
-        pages.append(SheetPage(run, name, sha256_of(file) if file.is_file() else None, part.passed))
+        pages.append(SheetPage(run, name, sha256_of(file), part.passed))
     return pages
 
 
@@ -90,8 +96,8 @@ def _shown(page: SheetPage, number: int, count: int) -> dict[str, object]:
         "facts": [
             ("Tool", facts.tool_facts(run)),
             ("Part", facts.stand_facts(run)),
-            ("Machine and program", facts.machine_facts(run)),
         ],
+        "machine": facts.machine_sentence(run),
         "poses": facts.poses(run, points),
         "cycle": facts.cycle(run),
         "checks": facts.checks(run, page.digest),

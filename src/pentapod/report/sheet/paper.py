@@ -13,7 +13,7 @@ from pentapod.base.arrays import Floats
 LETTER = 11.0
 """Height of letters, in units of the drawing; a unit is a CSS pixel where the drawing is as wide as it was made."""
 
-LETTER_WIDTH = 0.6
+LETTER_WIDTH = 0.65
 """Width of a letter as a share of its height, rather too much."""
 
 ARROW = 6.0
@@ -43,7 +43,7 @@ class Paper:
     low: Floats
     high: Floats
     width: float = 350.0
-    height: float = 280.0
+    height: float = 240.0
     rooms: Rooms = field(default_factory=Rooms)
     parts: list[str] = field(default_factory=list[str])
     taken: list[Box] = field(default_factory=list[Box])
@@ -63,6 +63,11 @@ class Paper:
         ])  # fmt: skip
         offset = np.asarray(points, dtype=np.float64) - 0.5 * (self.low + self.high)
         return middle + self.scale * offset * (1.0, -1.0)
+
+    def holds(self, point: Floats) -> bool:
+        """Whether a point, mm, is on the drawing, beside its dimensions."""
+        (x, y), rooms = self.at(point), self.rooms
+        return 4.0 < x < self.width - rooms.right and 4.0 < y < self.height - rooms.below
 
     def line(self, points: Floats, colour: str = "currentColor", width: float = 1.0, more: str = "") -> None:
         """Draw a line through points (K, 2), mm."""
@@ -109,16 +114,23 @@ class Paper:
             f'fill="currentColor" style="{_HALO}">{escape(text)}</text>'
         )
 
-    def label_at(self, point: Floats, text: str, kind: str = "label") -> None:
-        """Write a text beside a point, mm."""
+    def label_at(self, point: Floats, text: str) -> None:
+        """Write a text beside a point, mm: on the left first, since dimensions lead to the right and down."""
         x, y = self.at(point)
         side, off = 9.0, 0.36 * LETTER
         near = [
-            (x + side, y + off, "start"), (x - side, y + off, "end"), (x + side, y - side, "start"),
-            (x - side, y - side, "end"), (x + side, y + side + LETTER, "start"), (x - side, y + side + LETTER, "end"),
+            (x - side, y - 5.0, "end"), (x - side, y + off, "end"), (x + side, y - 5.0, "start"),
+            (x + side, y + off, "start"), (x - side, y + side + LETTER, "end"), (x + side, y + side + LETTER, "start"),
             (x, y - 12.0, "middle"), (x, y + 12.0 + LETTER, "middle"),
         ]  # fmt: skip
-        self.label(text, [*near, *((a, b + step, c) for step in (26.0, -26.0, 52.0, -52.0) for a, b, c in near)], kind)
+        self.label(text, [*near, *((a, b + step, c) for step in (-26.0, 26.0, -52.0, 52.0) for a, b, c in near)])
+
+    def spot(self, point: Floats, text: str, colour: str) -> None:
+        """Draw a point with its name."""
+        x, y = self.at(point)
+        self.parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colour}"/>')
+        self.keep((x - 3.0, y - 3.0, x + 3.0, y + 3.0))
+        self.label_at(point, text)
 
     def datum(self, point: Floats) -> None:
         """Draw the mark of a datum: a circle in quarters."""
@@ -133,7 +145,7 @@ class Paper:
     def arrow(self, point: Floats, along: Floats, length: float, text: str) -> None:
         """Draw an arrow of a length in units of the drawing from a point, mm, with a label at its head."""
         reach = float(np.linalg.norm(along))
-        if reach < 0.15:  # it points to the viewer
+        if reach < 0.4:  # it points to the viewer
             return
         (x, y), (dx, dy) = self.at(point), length * along * (1.0, -1.0)
         self.stroke(f"M{x:.1f} {y:.1f}L{x + dx:.1f} {y + dy:.1f}", 1.2)
@@ -145,18 +157,19 @@ class Paper:
         self.label(text, places)
 
     def across(self, start: Floats, end: Floats, text: str, ends: tuple[str, str] | None = None) -> None:
-        """Draw the dimension from one point to another to the right, below the drawing. ends: what is there, as text."""
+        """Draw the dimension to the right from one point to another, below the drawing. ends: texts at its ends."""
         (ax, ay), (bx, by) = sorted((self.at(start).tolist(), self.at(end).tolist()))
-        y = self.height - self.rooms.below + 16.0
+        y = self.height - self.rooms.below + 20.0
         self.stroke(f"M{ax:.1f} {ay + 3:.1f}V{y + 3:.1f}M{bx:.1f} {by + 3:.1f}V{y + 3:.1f}", 0.5)
         self._measure((ax, y), (bx, y))
-        middle, low = 0.5 * (ax + bx), y - 4.0
-        self.label(text, [(middle, low, "middle"), (bx + 5, y + 4, "start"), (ax - 5, y + 4, "end"),
-                          (middle, y + 1.2 * LETTER, "middle")], "dimension")  # fmt: skip
+        middle, beside, out = 0.5 * (ax + bx), y + 0.36 * LETTER, 2.5 * ARROW
+        within: list[Place] = [(middle, y - 4.0, "middle")] if _wide(text) + 8.0 < bx - ax else []
+        self.label(text, [*within, (bx + out, beside, "start"), (ax - out, beside, "end"),
+                          (middle, y + 1.3 * LETTER, "middle")], "dimension")  # fmt: skip
         if ends is not None:
-            for text, x, anchor in ((ends[0], ax, "end"), (ends[1], bx, "start")):
+            for there, x, anchor in ((ends[0], ax, "end"), (ends[1], bx, "start")):
                 places = [(x, y + 1.4 * LETTER, kind) for kind in ("middle", anchor)]
-                self.label(text, [*places, (x, y + 2.4 * LETTER, anchor)], "coordinate")
+                self.label(there, [*places, (x, y + 2.4 * LETTER, anchor)], "coordinate")
 
     def upright(self, start: Floats, end: Floats, text: str, ends: tuple[str, str] | None = None) -> None:
         """Draw the dimension upwards from one point to another, right of the drawing. ends: of the lower, the upper."""
@@ -167,9 +180,9 @@ class Paper:
         side, off = x + 5.0, 0.36 * LETTER
         middle = 0.5 * (ay + by) + off
         if ends is not None:
-            for text_there, y, step in ((ends[0], ay, LETTER), (ends[1], by, -LETTER)):
+            for there, y, step in ((ends[0], ay, LETTER), (ends[1], by, -LETTER)):
                 places = [(side, y + off + k * step, "start") for k in (0.0, 0.5, 1.0, 1.5, 2.0)]
-                self.label(text_there, places, "coordinate")
+                self.label(there, places, "coordinate")
         steps = (0.0, LETTER, -LETTER, 2.4 * LETTER, -2.4 * LETTER, 3.6 * LETTER, -3.6 * LETTER)
         self.label(text, [(side, middle + step, "start") for step in steps], "dimension")
 
@@ -197,7 +210,9 @@ class Paper:
 
     def _path(self, path: str, colour: str, width: float, more: str, inner: str = "") -> None:
         pen = f'stroke="{colour}" stroke-width="{width:g}" stroke-linejoin="round" stroke-linecap="round"'
-        self.parts.append(f'<path d="{path}" {pen} {more}>{inner}</path>' if inner else f'<path d="{path}" {pen} {more}/>')
+        self.parts.append(
+            f'<path d="{path}" {pen} {more}>{inner}</path>' if inner else f'<path d="{path}" {pen} {more}/>'
+        )
 
     def _is_free(self, box: Box) -> bool:
         inside = box[0] >= 1.0 and box[1] >= 0.0 and box[2] <= self.width - 1.0 and box[3] <= self.height
@@ -210,9 +225,13 @@ class Paper:
 
 def _box(place: Place, text: str) -> Box:
     x, y, anchor = place
-    wide = LETTER_WIDTH * LETTER * len(text)
+    wide = _wide(text)
     left = x - {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor] * wide
     return (left, y - 0.85 * LETTER, left + wide, y + 0.25 * LETTER)
+
+
+def _wide(text: str) -> float:
+    return LETTER_WIDTH * LETTER * len(text)
 
 
 def _size(box: Box) -> float:

@@ -78,19 +78,19 @@ class Grid:
         lower = line < y[:, 1]
         here, there = np.where(lower, 0, 1), np.where(lower, 1, 2)
         item = np.arange(len(rows))
-        ends: list[tuple[Floats, Floats]] = []
+        ends: list[Floats] = []
         for a, b in ((np.zeros_like(here), np.full_like(here, 2)), (here, there)):
             start, end = y[item, a], y[item, b]
             share = np.clip((line - start) / np.where(end > start, end - start, 1.0), 0.0, 1.0)
-            ends.append(tuple(v[item, a] + share * (v[item, b] - v[item, a]) for v in (x, z)))  # type: ignore[arg-type]
-        (x0, z0), (x1, z1) = ends
+            ends += [v[item, a] + share * (v[item, b] - v[item, a]) for v in (x, z)]
+        x0, z0, x1, z1 = ends
         swap = x0 > x1
         left, right = np.where(swap, x1, x0), np.where(swap, x0, x1)
         at_left, at_right = np.where(swap, z1, z0), np.where(swap, z0, z1)
         wide = right - left
-        slopes = np.where(wide > 1e-9, (at_right - at_left) / np.where(wide > 1e-9, wide, 1.0), 0.0)
+        slopes: Floats = np.where(wide > 1e-9, (at_right - at_left) / np.where(wide > 1e-9, wide, 1.0), 0.0)
         starts, stops = (np.ceil(v - 0.5).astype(np.intp) for v in (left, right))
-        heights = at_left + slopes * (starts + 0.5 - left)
+        heights: Floats = at_left + slopes * (starts + 0.5 - left)
         kept = stops > starts
         return Cuts(rows[kept], starts[kept], stops[kept], heights[kept], slopes[kept])
 

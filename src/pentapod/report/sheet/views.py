@@ -20,11 +20,17 @@ from pentapod.report.sheet.touch_off import TouchOff, touch_off_points
 MOST_POINTS = 1500
 """Points of the tool path that are drawn."""
 
+FAR = 0.35
+"""Share of the part's size by which the origin of its mesh may be beside it, to be drawn with it."""
+
 CIRCLE = 73
 """Points of a circle."""
 
-SLIM = Rooms(22.0, 18.0, 62.0, 34.0)
-"""Room around the machine."""
+ABOVE, FRONT = Rooms(16.0, 10.0, 76.0, 30.0), Rooms(16.0, 12.0, 76.0, 18.0)
+"""Room around the machine, seen from above and from the front."""
+
+PART = Rooms(22.0, 14.0, 76.0, 48.0)
+"""Room around the part by itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +101,11 @@ def setup_drawings(run: PlannedRun) -> str:
     above, front = _from_above(run.hangs), _from_front(run.hangs)
     part_above, part_front = (view.seen(run.vertices, run.mesh.faces) for view in (above, front))
     points = touch_off_points(run)
-    return _in_machine(run, above, part_above) + _in_machine(run, front, part_front) + _part(run, above, part_above, points)
+    return (
+        _in_machine(run, above, part_above)
+        + _in_machine(run, front, part_front)
+        + _part(run, above, part_above, points)
+    )
 
 
 def all_drawings(run: PlannedRun) -> str:
@@ -119,25 +129,28 @@ def machine_drawings(machine: Machine) -> str:
     half = np.array([0.0, 0.0, 0.5 * work.height])
     drawn = ""
     for view in (_from_above(hangs), _from_front(hangs)):
-        paper = _paper(view, np.concatenate([bones.points, circle + half, circle - half]))
+        flat = view.flat(np.concatenate([bones.points, circle + half, circle - half]))
+        paper = Paper(flat.min(axis=0), flat.max(axis=0), rooms=FRONT)
         for ring in (circle - half, circle + half):
             paper.line(view.flat(ring), LIMIT_COLOUR)
         _draw_machine(paper, view, bones)
         paper.datum(view.flat(work.centre))
         paper.label_at(view.flat(work.centre), "middle of the work volume")
-        drawn += paper.svg(f"The machine {view.title}", f"{view.caption} Tool upright.")
+        drawn += paper.svg(
+            f"The machine {view.title}", f"From {view.title.removeprefix('from ')}: {view.caption}; tool upright"
+        )
     return drawn
 
 
 def _from_above(hangs: bool) -> View:
     up = np.array([0.0, -1.0 if hangs else 1.0, 0.0])
-    caption = f"x to the right, y {'towards you' if hangs else 'away from you'}."
+    caption = f"x to the right, y {'towards you' if hangs else 'away from you'}"
     return View("from above", caption, np.array([1.0, 0.0, 0.0]), up, ("x", "y"), (1.0, float(up[1])))
 
 
 def _from_front(hangs: bool) -> View:
     up = np.array([0.0, 0.0, -1.0 if hangs else 1.0])
-    caption = f"x to the right, z {'down' if hangs else 'up'}."
+    caption = f"x to the right, z {'down' if hangs else 'up'}"
     return View("from the front", caption, np.array([1.0, 0.0, 0.0]), up, ("x", "z"), (1.0, float(up[2])))
 
 
@@ -148,13 +161,8 @@ def _along_lean(run: PlannedRun) -> View:
         return front
     azimuth = run.stand.azimuth
     right = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    caption = f"To the right is the direction {words_of(np.degrees(azimuth), 1)}° in plan, to which the part leans."
+    caption = f"it leans to the right, to {words_of(np.degrees(azimuth), 1)}° in plan"
     return View("from the side", caption, right, front.up, ("", "z"), front.signs)
-
-
-def _paper(view: View, points: Floats, rooms: Rooms = SLIM) -> Paper:
-    flat = view.flat(points)
-    return Paper(flat.min(axis=0), flat.max(axis=0), rooms=rooms)
 
 
 def _draw_machine(paper: Paper, view: View, bones: _Bones) -> None:
@@ -180,8 +188,8 @@ def _in_machine(run: PlannedRun, view: View, part: Outline) -> str:
     shown = [view.flat(bones.points), view.flat(np.stack([zero, origin])), part.low[None], part.high[None]]
     shown += [] if held is None else [held.low[None], held.high[None]]
     points = np.concatenate(shown)
-    paper = Paper(points.min(axis=0), points.max(axis=0), rooms=SLIM)
     sideways = view.names[1] == "z"
+    paper = Paper(points.min(axis=0), points.max(axis=0), rooms=FRONT if sideways else ABOVE)
     if sideways:
         _levels(paper, run, view)
     if held is not None and run.held is not None:
@@ -195,12 +203,12 @@ def _in_machine(run: PlannedRun, view: View, part: Outline) -> str:
     paper.keep((x - 8.0, y - 8.0, x + 8.0, y + 8.0))
     paper.datum(datum)
     place = view.coordinates(datum)
-    paper.across(centre, datum, f"{view.names[0]} {words_of(place[0])}")
+    if not sideways:
+        paper.across(centre, datum, f"{view.names[0]} {words_of(place[0])}")
     paper.upright(centre, datum, f"{view.names[1]} {words_of(place[1])}")
     paper.label_at(datum, "datum")
     paper.label_at(centre, "machine zero")
-    caption = f"In the machine, {view.title}: {view.caption} First pose of the tool."
-    return paper.svg(f"the machine and the part {view.title}", caption)
+    return paper.svg(f"the machine and the part {view.title}", f"In the machine, {view.title}: {view.caption}")
 
 
 def _levels(paper: Paper, run: PlannedRun, view: View) -> None:
@@ -218,12 +226,11 @@ def _levels(paper: Paper, run: PlannedRun, view: View) -> None:
 def _part(run: PlannedRun, view: View, part: Outline, points: Sequence[TouchOff]) -> str:
     """Return the part by itself as it stands, with its size, its edges in the machine, and the touch-off points."""
     origin = view.flat(run.placement.translation)
-    rooms = Rooms()
     corners = np.stack([part.low, part.high])
-    near = np.clip(origin, part.low - 0.35 * np.ptp(corners, axis=0).max(), part.high + 0.35 * np.ptp(corners, axis=0).max())
-    fits = bool((near == origin).all())
+    room = FAR * float(np.ptp(corners, axis=0).max())
+    fits = bool((origin >= part.low - room).all() and (origin <= part.high + room).all())
     around = np.concatenate([corners, origin[None]]) if fits else corners
-    paper = Paper(around.min(axis=0), around.max(axis=0), rooms=rooms)
+    paper = Paper(around.min(axis=0), around.max(axis=0), rooms=PART)
     upright = view.names[1] == "z"
     paper.area(part.areas, QUIET_COLOUR, "part")
     if not upright:
@@ -243,12 +250,15 @@ def _part(run: PlannedRun, view: View, part: Outline, points: Sequence[TouchOff]
     paper.across(part.low, lower_right, words_of(extent[0]), sides)
     levels = (f"{names[1]} {words_of(low[1])}", f"{names[1]} {words_of(high[1])}")
     paper.upright(lower_right, part.high, words_of(extent[1]), levels)
+    if not upright:
+        for name, pose in (("start", run.first), ("end", run.last)):
+            if paper.holds(view.flat(pose.tip)):
+                paper.spot(view.flat(pose.tip), name, LIMIT_COLOUR)
     if fits:
         for axis, name in zip(run.placement.rotation.T, "XYZ", strict=True):
             paper.arrow(origin, view.flat(1e-3 * axis), 30.0, name)
         paper.label_at(origin, "datum")
-    caption = f"The part {view.title}, as it stands: {view.caption}"
-    return paper.svg(f"the part {view.title}", caption)
+    return paper.svg(f"the part {view.title}", f"The part {view.title}: {view.caption}")
 
 
 def _rest(paper: Paper, run: PlannedRun, view: View, part: Outline) -> None:
@@ -262,9 +272,11 @@ def _rest(paper: Paper, run: PlannedRun, view: View, part: Outline) -> None:
     rise = float(np.tan(run.stand.lean)) * (right - left)
     wedge = np.array([[left, low], [right, low], [left, low + rise], [left, low]])
     paper.line(wedge, "currentColor", 1.0, 'stroke-dasharray="4 3"')
-    x, y = paper.at([right, low])
+    x, y = paper.at([left, low])
     text = f"{words_of(np.degrees(run.stand.lean))}°"
-    paper.label(text, [(x - 60.0, y - 4.0, "middle"), (x - 60.0, y + 13.0, "middle"), (x - 30.0, y - 4.0, "end")], "angle")
+    paper.label(
+        text, [(x + 8.0, y - 5.0, "start"), (x + 8.0, y + 13.0, "start"), (x - 4.0, y + 13.0, "middle")], "angle"
+    )
 
 
 def words_of(value: float, digits: int = 2) -> str:
