@@ -24,7 +24,8 @@ from pentapod.planning import PlacedPath
 from pentapod.program import Program
 from pentapod.report import write_report
 from pentapod.report.decimate import keep_extremes, thinned_mesh
-from pentapod.report.figure import leg_colour, leg_dash
+from pentapod.report.drawings.colours import leg_colour
+from pentapod.report.figure import leg_dash
 from pentapod.report.signals import Signals
 from pentapod.report.words import duration, number, opening, placement_sentences
 from pentapod.timing import Trajectory

@@ -16,8 +16,8 @@ from pentapod.base.version import __version__
 from pentapod.design.members import MACHINE, Front, Member
 from pentapod.design.quantities import QUANTITIES, Quantity
 from pentapod.job.artefacts import REPORT
-from pentapod.report.figure import LIMIT_COLOUR, QUIET_COLOUR
-from pentapod.report.sheet.views import machine_drawings
+from pentapod.report.drawings.colours import LIMIT_COLOUR, QUIET_COLOUR
+from pentapod.report.drawings.views import machine_drawings
 from pentapod.report.template import write_page
 from pentapod.report.words import number
 

@@ -16,15 +16,8 @@ from pentapod.report.decimate import keep_extremes
 
 Figure = dict[str, Any]
 
-LEG_COLOURS = ("#2a78d6", "#1baa7a", "#e08a00", "#c2417c", "#7a5cd6", "#3b9ab2")
-"""Colours of the legs, the same in every figure, legible on a light and on a dark background."""
-
 LEG_DASHES = ("solid", "10px 3px", "2px 2px", "8px 2px 2px 2px", "16px 4px", "5px 5px")
 """Dashes of the legs, so that lines differ without colour, too."""
-
-LIMIT_COLOUR = "#d2413a"
-QUIET_COLOUR = "#8a8f98"
-HELD_COLOUR = "#a08a6a"
 
 PLOT_CONFIG = {
     "responsive": True, "scrollZoom": False, "displaylogo": False, "showSendToCloud": False, "plotlyServerURL": "",
@@ -54,11 +47,6 @@ class Detail:
 
 
 DETAIL = Detail()
-
-
-def leg_colour(leg: int) -> str:
-    """Return the colour of a leg, counted from 0; they repeat where there are more legs than colours."""
-    return LEG_COLOURS[leg % len(LEG_COLOURS)]
 
 
 def leg_dash(leg: int) -> str:

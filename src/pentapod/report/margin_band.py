@@ -11,7 +11,8 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import equal_runs
-from pentapod.report.figure import DETAIL, LIMIT_COLOUR, QUIET_COLOUR
+from pentapod.report.drawings.colours import LIMIT_COLOUR, QUIET_COLOUR
+from pentapod.report.figure import DETAIL
 
 WIDTH, HEIGHT, LEFT, BOTTOM = 1080.0, 200.0, 44.0, 26.0
 """Size of the drawing and of its margins, in its own units."""

@@ -8,16 +8,8 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.machine.machine import Machine
-from pentapod.report.figure import (
-    DETAIL,
-    LIMIT_COLOUR,
-    QUIET_COLOUR,
-    Figure,
-    curve,
-    leg_colour,
-    leg_dash,
-    rows_layout,
-)
+from pentapod.report.drawings.colours import LIMIT_COLOUR, QUIET_COLOUR, leg_colour
+from pentapod.report.figure import DETAIL, Figure, curve, leg_dash, rows_layout
 from pentapod.report.signals import Signals
 
 TITLES = ("leg lengths, mm", "leg rates, mm/s", "leg accelerations, mm/s²", "speed, mm/min", "margins, 0 at a limit")

@@ -15,16 +15,8 @@ from pentapod.machine.machine import Machine
 from pentapod.mesh.diagnosis import fault_edges
 from pentapod.mesh.mesh import Mesh
 from pentapod.report.decimate import keep_extremes, thinned_mesh
-from pentapod.report.figure import (
-    DETAIL,
-    HELD_COLOUR,
-    LEG_COLOURS,
-    LIMIT_COLOUR,
-    QUIET_COLOUR,
-    Figure,
-    leg_colour,
-    packed,
-)
+from pentapod.report.drawings.colours import HELD_COLOUR, LEG_COLOURS, LIMIT_COLOUR, QUIET_COLOUR, leg_colour
+from pentapod.report.figure import DETAIL, Figure, packed
 from pentapod.report.held import Held
 from pentapod.report.signals import Signals
 from pentapod.toolpath.linking.partition import Piece

@@ -8,11 +8,11 @@ from pentapod.base.units import from_si
 from pentapod.job.outcome import Outcome
 from pentapod.planning.diagnosis import ActiveLimit, active_limits
 from pentapod.planning.placement.placed_path import PlacedPath
+from pentapod.report.drawings.planned_run import PlannedRun
+from pentapod.report.drawings.touch_off import touch_off_points, touch_off_table
+from pentapod.report.drawings.views import all_drawings
 from pentapod.report.figure import DETAIL
 from pentapod.report.margin_band import margin_band
-from pentapod.report.sheet.planned_run import PlannedRun
-from pentapod.report.sheet.touch_off import touch_off_points, touch_off_table
-from pentapod.report.sheet.views import all_drawings
 from pentapod.report.words import number
 
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.report.figure import DETAIL, Figure, as_script, curve, leg_colour, leg_dash, rows_layout
+from pentapod.report.drawings.colours import leg_colour
+from pentapod.report.figure import DETAIL, Figure, as_script, curve, leg_dash, rows_layout
 from pentapod.report.template import write_page
 from pentapod.simulate import Tracking
 

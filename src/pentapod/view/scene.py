@@ -12,7 +12,7 @@ from pentapod.kinematics.legs_on_rings import LegsOnRings
 from pentapod.machine.clearance.collision_world import mounted
 from pentapod.machine.leg_ends import arms_beside, base_rim, rails, strut_ends
 from pentapod.report.decimate import thinned_mesh
-from pentapod.report.figure import LIMIT_COLOUR, leg_colour
+from pentapod.report.drawings.colours import LIMIT_COLOUR, leg_colour
 from pentapod.view.motion import MachinePose
 from pentapod.view.opened_run import OpenedRun
 from pentapod.view.shapes import along, quaternion, revolved, rotation_of, tool_mesh

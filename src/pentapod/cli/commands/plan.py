@@ -184,7 +184,7 @@ def _write_report(outcome: Outcome, file: Path) -> None:
 
 
 def _write_sheet(outcome: Outcome, file: Path) -> None:
-    from pentapod.report import write_sheet
+    from pentapod.report.sheet import write_sheet
 
     write_sheet(outcome, file)
 

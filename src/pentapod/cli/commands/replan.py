@@ -33,7 +33,8 @@ def replan(folder: Path, placement: Path, out: Path | None, explain: bool, as_js
     from pentapod.job.artefacts import REPORT, SHEET
     from pentapod.job.clamped.replan import FOLDER
     from pentapod.job.clamped.replan import replan as planned_again
-    from pentapod.report import write_report, write_sheet
+    from pentapod.report import write_report
+    from pentapod.report.sheet import write_sheet
 
     writers: dict[str, Writer] = {REPORT: write_report, SHEET: write_sheet}
     target = folder / FOLDER if out is None else out

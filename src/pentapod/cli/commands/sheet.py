@@ -67,8 +67,8 @@ def _page(folder: Path, name: str, run: OpenedRun) -> SheetPage:
     from pentapod.base.errors import InputError
     from pentapod.base.files import sha256_of
     from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD
+    from pentapod.report.drawings.planned_run import PlannedRun
     from pentapod.report.sheet.page import SheetPage
-    from pentapod.report.sheet.planned_run import PlannedRun
 
     program = run.program
     if program is None:

@@ -13,7 +13,8 @@ from pentapod.machine.calibration.parameters import KINDS, PARAMETERS
 from pentapod.machine.identification.identification import Identified, believed
 from pentapod.machine.identification.sensitivity import numbers_of
 from pentapod.machine.machine import Machine
-from pentapod.report.figure import QUIET_COLOUR, Figure, as_script, leg_colour, packed, rows_layout
+from pentapod.report.drawings.colours import QUIET_COLOUR, leg_colour
+from pentapod.report.figure import Figure, as_script, packed, rows_layout
 from pentapod.report.template import write_page
 
 ROW_PX = 260

@@ -1,1 +1,5 @@
-"""The set-up sheet: drawings with dimensions, touch-off points, numbers, and the page that is printed."""
+"""The set-up sheet: one HTML file without script, a printed page for each set-up."""
+
+from pentapod.report.sheet.page import write_sheet
+
+__all__ = ["write_sheet"]

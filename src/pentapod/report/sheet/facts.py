@@ -13,9 +13,9 @@ from pentapod.cutters.mounted import Mounted
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.solids import Cone
 from pentapod.report import words
-from pentapod.report.sheet.planned_run import PlannedRun
-from pentapod.report.sheet.touch_off import TouchOff
-from pentapod.report.sheet.views import words_of
+from pentapod.report.drawings.planned_run import PlannedRun
+from pentapod.report.drawings.touch_off import TouchOff
+from pentapod.report.drawings.views import words_of
 from pentapod.toolpath.toolpath import SegmentKind
 
 Fact = tuple[str, str]

@@ -11,10 +11,10 @@ from pentapod.base.files import atomic_write, sha256_of
 from pentapod.base.version import __version__
 from pentapod.job.artefacts import PROGRAM
 from pentapod.job.outcome import Outcome, SetUps
+from pentapod.report.drawings.planned_run import PlannedRun
+from pentapod.report.drawings.touch_off import touch_off_points
+from pentapod.report.drawings.views import all_drawings
 from pentapod.report.sheet import facts
-from pentapod.report.sheet.planned_run import PlannedRun
-from pentapod.report.sheet.touch_off import touch_off_points
-from pentapod.report.sheet.views import all_drawings
 from pentapod.toolpath.linking.partition import Piece
 
 

@@ -20,7 +20,7 @@ from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.program.program import Program
-from pentapod.report.held import Held, held_at
+from pentapod.report.drawings.held import Held, held_at
 from pentapod.timing.time_law.trajectory import Trajectory
 from pentapod.toolpath.toolpath import Toolpath
 

@@ -11,11 +11,11 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.job.outcome import Outcome
 from pentapod.machine.leg_ends import arms_beside, base_rim, leg_ends, line_top, rails, strut_ends
 from pentapod.machine.machine import Machine
-from pentapod.report.figure import HELD_COLOUR, LIMIT_COLOUR, QUIET_COLOUR, leg_colour
-from pentapod.report.sheet.outline import Outline, outline_of
-from pentapod.report.sheet.paper import Paper, Rooms
-from pentapod.report.sheet.planned_run import PlannedRun
-from pentapod.report.sheet.touch_off import TouchOff, touch_off_points
+from pentapod.report.drawings.colours import HELD_COLOUR, LIMIT_COLOUR, QUIET_COLOUR, leg_colour
+from pentapod.report.drawings.outline import Outline, outline_of
+from pentapod.report.drawings.paper import Paper, Rooms
+from pentapod.report.drawings.planned_run import PlannedRun
+from pentapod.report.drawings.touch_off import TouchOff, touch_off_points
 
 MOST_POINTS = 1500
 """Points of the tool path that are drawn."""

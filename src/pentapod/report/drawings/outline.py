@@ -12,7 +12,7 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.runs import members, run_starts
 from pentapod.mesh.topology import Topology
-from pentapod.report.sheet.raster import Grid, borders, simplified
+from pentapod.report.drawings.raster import Grid, borders, simplified
 
 
 @dataclass(frozen=True)
@@ -127,10 +127,10 @@ class _Seen:
         places = flat[edge, 0] + share * (flat[edge, 1] - flat[edge, 0])
         depths = edges[edge, 0, 2] + share[:, 0] * (edges[edge, 1, 2] - edges[edge, 0, 2])
         # The nearest facet counts where all cells around are in front: a line is at the end of the surface beside it.
-        inside: Bools = np.asarray(minimum_filter(self.covered, 3))
+        inside = np.asarray(minimum_filter(self.covered, 3)) > 0
         around: Floats = np.asarray(minimum_filter(self.nearest, 3))
         column, row = (np.clip(places[:, k].astype(np.intp), 0, self.covered.shape[1 - k] - 1) for k in (0, 1))
-        beside: Bools = np.asarray(maximum_filter(self.covered, 3))
+        beside = np.asarray(maximum_filter(self.covered, 3)) > 0
         on_border = ~inside[row, column] & beside[row, column]
         seen = (depths >= around[row, column] - 1e-9) & ~on_border
         # Pieces of an edge that follow each other are one part.

@@ -9,7 +9,7 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.units import from_si
 from pentapod.mesh.query.tree import FacetTree
-from pentapod.report.sheet.planned_run import PlannedRun
+from pentapod.report.drawings.planned_run import PlannedRun
 from pentapod.toolpath.toolpath import SegmentKind
 
 COUNT = 3
