@@ -37,6 +37,7 @@ def test_plan_and_verify(make_job, tmp_path, capsys):
         "program.csv",
         "verdict.json",
         "report.html",
+        "sheet.html",
         "plan.npz",
         "manifest.json",
     }

@@ -27,7 +27,7 @@ class OutlineOptions:
 
     cells: int = 900
     crease_deg: float = 35.0
-    close: float = 0.6
+    close: float = 1.0
     shortest: float = 4.0
     smallest: float = 3.0
     most_lines: int = 3000

@@ -168,8 +168,9 @@ class Paper:
                           (middle, y + 1.3 * LETTER, "middle")], "dimension")  # fmt: skip
         if ends is not None:
             for there, x, anchor in ((ends[0], ax, "end"), (ends[1], bx, "start")):
-                places = [(x, y + 1.4 * LETTER, kind) for kind in ("middle", anchor)]
-                self.label(there, [*places, (x, y + 2.4 * LETTER, anchor)], "coordinate")
+                inside = max(0.5 * _wide(there) + 2.0, x)
+                places: list[Place] = [(inside, y + 1.4 * LETTER, "middle"), (x, y + 1.4 * LETTER, anchor)]
+                self.label(there, [*places, (inside, y + 2.4 * LETTER, "middle")], "coordinate")
 
     def upright(self, start: Floats, end: Floats, text: str, ends: tuple[str, str] | None = None) -> None:
         """Draw the dimension upwards from one point to another, right of the drawing. ends: of the lower, the upper."""

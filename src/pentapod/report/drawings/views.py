@@ -235,7 +235,7 @@ def _part(run: PlannedRun, view: View, part: Outline, points: Sequence[TouchOff]
     paper.area(part.areas, QUIET_COLOUR, "part")
     if not upright:
         even = np.linspace(0, len(run.tips) - 1, min(len(run.tips), MOST_POINTS)).astype(np.intp)
-        paper.line(view.flat(run.tips[even]), LIMIT_COLOUR, 0.5)
+        paper.line(view.flat(run.tips[even]), LIMIT_COLOUR, 0.5, 'stroke-opacity="0.6"')
     paper.lines(part.lines, "currentColor", 0.6)
     if upright:
         _rest(paper, run, view, part)
