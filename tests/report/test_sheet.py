@@ -126,7 +126,15 @@ def test_sheet_of_a_changed_job_part_or_machine_is_an_error(copied, capsys):
     part.write_bytes(mesh)
     machine = copied / "desk.toml"
     machine.write_text(machine.read_text().replace("max_velocity_mm_s = 500", "max_velocity_mm_s = 501"))
-    assert "the machine was changed since this run" in refused(capsys, out)
+    assert "changed since this run" in refused(capsys, out)
+    machine.write_text(machine.read_text().replace("max_velocity_mm_s = 501", "max_velocity_mm_s = 500"))
+    assert command(["sheet", str(out)]) == 0
+    capsys.readouterr()
+    program = out / "program.csv"  # a shipped machine may have been another one in the version that planned
+    program.write_text(re.sub(r'machine_digest = "\w+"', f'machine_digest = "{"0" * 16}"', program.read_text()))
+    assert "different runs" in refused(capsys, out)
+    (out / "manifest.json").unlink()
+    assert "not the one that the program was made for" in refused(capsys, out)
     job.unlink()
     assert "--job" in refused(capsys, out)
 

@@ -36,9 +36,11 @@ OVERLAPS = """() => [...document.querySelectorAll("figure svg")].flatMap((svg) =
     return {text: node.textContent, left: box.left, right: box.right, top: box.top + 0.2 * box.height,
             bottom: box.bottom - 0.2 * box.height};
   });
-  const found = boxes.filter((b) => b.left < frame.left - 1 || b.right > frame.right + 1).map((b) => `cut off: ${b.text}`);
+  const cut = boxes.filter((b) => b.left < frame.left - 1 || b.right > frame.right + 1);
+  const found = cut.map((b) => `cut off: ${b.text}`);
   boxes.forEach((a, k) => boxes.slice(k + 1).forEach((b) => {
-    if (a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom) found.push(`${a.text} on ${b.text}`);
+    const over = a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+    if (over) found.push(`${a.text} on ${b.text}`);
   }));
   return found;
 })"""

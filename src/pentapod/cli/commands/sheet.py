@@ -79,9 +79,11 @@ def _page(folder: Path, name: str, run: OpenedRun) -> SheetPage:
         )
     made_for, remedy = program.provenance, "plan the job again"
     if not run.same_job:
-        raise InputError("the job or its part was changed since this run", file=run.job.path, remedy=remedy)
+        raise InputError(
+            "the job, its part or its machine was changed since this run", file=run.job.path, remedy=remedy
+        )
     if made_for.machine_digest != run.machine.digest:
-        what = "the machine was changed since this run"
+        what = "the machine is not the one that the program was made for"
         raise InputError(
             what, file=run.job.path, value=run.machine.digest, expected=made_for.machine_digest, remedy=remedy
         )

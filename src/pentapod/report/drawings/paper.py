@@ -30,23 +30,33 @@ _HALO = "paint-order:stroke;stroke:var(--sheet,#fff);stroke-width:3px;stroke-lin
 class Rooms:
     """Room around what is drawn, for dimensions: left, above, right, below."""
 
-    left: float = 22.0
-    above: float = 18.0
-    right: float = 66.0
-    below: float = 40.0
+    left: float
+    above: float
+    right: float
+    below: float
+
+
+WIDTH, HIGHEST, LOWEST = 350.0, 250.0, 130.0
+"""Width of a drawing, and how high it may be."""
 
 
 @dataclass
 class Paper:
-    """A drawing `width` by `height` of the plane region low..high (2,), mm, to the right and upwards."""
+    """A drawing of the plane region low..high (2,), mm, to the right and upwards; no higher than it has to be."""
 
     low: Floats
     high: Floats
-    width: float = 350.0
-    height: float = 240.0
-    rooms: Rooms = field(default_factory=Rooms)
+    rooms: Rooms
+    width: float = WIDTH
     parts: list[str] = field(default_factory=list[str])
     taken: list[Box] = field(default_factory=list[Box])
+
+    @property
+    def height(self) -> float:
+        """Its height."""
+        rooms, (wide, high) = self.rooms, np.maximum(self.high - self.low, 1e-9)
+        needed = (self.width - rooms.left - rooms.right) * high / wide + rooms.above + rooms.below
+        return float(np.clip(np.ceil(needed), LOWEST, HIGHEST))
 
     @property
     def scale(self) -> float:

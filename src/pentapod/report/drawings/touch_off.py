@@ -15,6 +15,9 @@ from pentapod.toolpath.toolpath import SegmentKind
 COUNT = 3
 """Points that hold a plane."""
 
+INNER = 0.1
+"""Share of the waypoints at each end of x, y and z, mesh frame, that are no touch-off points: there a part may end."""
+
 
 @dataclass(frozen=True, eq=False)
 class TouchOff:
@@ -74,13 +77,20 @@ def _numbers(values: Floats, digits: int) -> str:
 
 
 def _spread(run: PlannedRun, count: int) -> Ints:
-    """Return waypoints (k,) on cuts that are far from each other: the first far from the middle."""
+    """Return waypoints (k,) on cuts that are far from each other, but not at the end of what is machined.
+
+    The first is far from the middle.
+    """
     toolpath = run.toolpath
     kinds = np.array([toolpath.segments[k].kind is SegmentKind.CUT for k in toolpath.segment_of_interval])
     rows = np.flatnonzero(kinds)
-    points = run.tips[rows] + toolpath.tilt_centre * run.axes[rows]
     if len(rows) < count:
         return rows[:0]
+    points = toolpath.tilt_centres[rows]
+    low, high = np.quantile(points, (INNER, 1.0 - INNER), axis=0)
+    inner = ((points >= low) & (points <= high)).all(axis=1)
+    if inner.sum() >= count:
+        rows, points = rows[inner], points[inner]
     chosen: list[int] = []
     nearest = np.linalg.norm(points - points.mean(axis=0), axis=1)
     while len(chosen) < count:
