@@ -101,7 +101,7 @@ reference: $(READY)  ## the pages of docs/reference, from the code
 
 pictures: $(READY)  ## the screenshots of the documentation, from the tests that open a browser
 	mkdir -p out/shots
-	PENTAPOD_SHOTS=out/shots $(BIN)/pytest tests/report/test_report_in_browser.py tests/view/test_viewer.py -k "drawn or draws"
+	PENTAPOD_SHOTS=out/shots $(BIN)/pytest tests/report/test_report_in_browser.py tests/report/test_sheet_in_browser.py tests/view/test_viewer.py -k "loads or prints or drawn"
 	cp out/shots/report.png out/shots/sheet.png out/shots/view.png docs/
 
 site: $(READY)  ## the documentation as a site, in site/

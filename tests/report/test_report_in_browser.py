@@ -116,7 +116,6 @@ def opened(request, chromium, report):
         page.page.screenshot(path=Path(shots) / f"report-{request.param}.png", full_page=True)
         if request.param == "light":
             page.page.locator("section", has=page.page.locator("#scene")).screenshot(path=Path(shots) / "report.png")
-            page.page.locator(".sheet").screenshot(path=Path(shots) / "sheet.png")
     yield page
     page.page.close()
 
