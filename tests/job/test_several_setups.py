@@ -18,6 +18,7 @@ from pentapod.job.outcome import SetUps
 from pentapod.machine.machine import Machine
 from pentapod.program import read_csv
 from pentapod.report import write_report
+from pentapod.report.sheet import write_sheet
 from pentapod.toolpath import Toolpath
 from pentapod.toolpath.linking.partition import cutting_intervals
 from pentapod.view import open_run
@@ -52,7 +53,7 @@ def job(tmp_path_factory):
 @pytest.fixture(scope="module")
 def done(job):
     out = job.parent / "out"
-    return out, run(Job.load(job), out, writers={"report.html": write_report})
+    return out, run(Job.load(job), out, writers={"report.html": write_report, "sheet.html": write_sheet})
 
 
 @pytest.fixture
@@ -74,10 +75,11 @@ def test_each_set_up_has_its_files(done):
         "plan.npz",
         "verdict.json",
         "report.html",
+        "sheet.html",
         "manifest.json",
     }
     for part in setups.parts:
-        assert {p.name for p in (out / part.folder).iterdir()} == EACH | {"report.html"}
+        assert {p.name for p in (out / part.folder).iterdir()} == EACH | {"report.html", "sheet.html"}
         assert part.margin > 0.02
         assert part.duration == read_csv(out / part.folder / "program.csv").duration
         assert part.outcome.passed
@@ -153,6 +155,21 @@ def test_verdict_and_report_of_several_set_ups_name_all(done):
     page = (out / "report.html").read_text()
     assert re.findall(r'href="(setup-\d/report.html)"', page) == ["setup-1/report.html", "setup-2/report.html"]
     assert "part stands" in (out / "setup-2" / "report.html").read_text()
+
+
+def test_the_set_up_sheet_has_a_page_for_each(done, tmp_path):
+    out, _ = done
+    sheet = (out / "sheet.html").read_text()
+    assert re.findall(r"<h1>([^<]*)</h1>", sheet) == ["job, set-up 1", "job, set-up 2"]
+    own = [(out / folder / "sheet.html").read_text() for folder in ("setup-1", "setup-2")]
+    for number, page in enumerate(own, start=1):
+        assert re.findall(r"<h1>([^<]*)</h1>", page) == [f"job, set-up {number}"]
+        legs = read_csv(out / f"setup-{number}" / "program.csv").legs[0]
+        assert ", ".join(f"{1e3 * leg:.3f}" for leg in legs) in page
+    assert own[0] != own[1]
+    for folder, wanted in ((out, sheet), (out / "setup-2", own[1])):
+        assert command(["sheet", str(folder), "-o", str(tmp_path / "again.html")]) == 0
+        assert (tmp_path / "again.html").read_text() == wanted
 
 
 def test_the_programs_together_are_the_job_and_one_alone_is_not(done, job, capsys):

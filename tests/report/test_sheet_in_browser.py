@@ -96,7 +96,9 @@ def test_sheet_prints_a_page_for_each_set_up(chromium, sheets, count):
     assert max(high) < 1047 - 20, "room for longer texts"
     assert page.evaluate(OVERLAPS) == []
     if (shots := os.environ.get("PENTAPOD_SHOTS")) and count == 1:
-        page.screenshot(path=Path(shots) / "sheet.png")
+        page.emulate_media(media="screen")
+        page.set_viewport_size({"width": 820, "height": 1000})
+        page.screenshot(path=Path(shots) / "sheet.png", full_page=True)
     page.close()
 
 

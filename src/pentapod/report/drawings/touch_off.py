@@ -15,6 +15,9 @@ from pentapod.toolpath.toolpath import SegmentKind
 COUNT = 3
 """Points that hold a plane."""
 
+SAME = 1e-6
+"""Metres by which points may differ that count as equal."""
+
 INNER = 0.1
 """Share of the waypoints at each end of x, y and z, mesh frame, that are no touch-off points: there a part may end."""
 
@@ -86,15 +89,16 @@ def _spread(run: PlannedRun, count: int) -> Ints:
     rows = np.flatnonzero(kinds)
     if len(rows) < count:
         return rows[:0]
-    points = toolpath.tilt_centres[rows]
+    # Rounded, so that a run read back from its folder, in millimetres, has the same points.
+    points = np.round(toolpath.tilt_centres[rows], 7)
     low, high = np.quantile(points, (INNER, 1.0 - INNER), axis=0)
-    inner = ((points >= low) & (points <= high)).all(axis=1)
+    inner = ((points >= low - SAME) & (points <= high + SAME)).all(axis=1)
     if inner.sum() >= count:
         rows, points = rows[inner], points[inner]
     chosen: list[int] = []
-    nearest = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    nearest = np.round(np.linalg.norm(points - points.mean(axis=0), axis=1), 7)
     while len(chosen) < count:
         chosen.append(int(nearest.argmax()))
-        off = np.linalg.norm(points - points[chosen[-1]], axis=1)
+        off = np.round(np.linalg.norm(points - points[chosen[-1]], axis=1), 7)
         nearest = off if len(chosen) == 1 else np.minimum(nearest, off)
     return rows[chosen]
