@@ -111,6 +111,10 @@ def test_sheet_on_a_screen_is_quiet_and_legible(chromium, sheets, width, scheme)
     assert page.evaluate(OVERLAPS) == []
     letters = "[...document.querySelectorAll('figure text[class]')].map((node) => node.getBoundingClientRect().height)"
     assert min(page.evaluate(letters)) > 9.5
+    narrow = (
+        "[...document.querySelectorAll('.scroll')].filter((node) => node.scrollWidth > node.clientWidth + 1).length"
+    )
+    assert width == 390 or page.evaluate(narrow) == 0
     page.locator("input[type=checkbox]").first.check()
     if shots := os.environ.get("PENTAPOD_SHOTS"):
         page.screenshot(path=Path(shots) / f"sheet-{width}-{scheme}.png", full_page=True)

@@ -36,7 +36,7 @@ class Rooms:
     below: float
 
 
-WIDTH, HIGHEST, LOWEST = 350.0, 250.0, 130.0
+WIDTH, HIGHEST, LOWEST = 350.0, 220.0, 130.0
 """Width of a drawing, and how high it may be."""
 
 
