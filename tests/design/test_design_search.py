@@ -91,7 +91,7 @@ def test_command_writes_machines_that_hold(narrow, tmp_path, capsys, monkeypatch
         assert front["means"]["amplification"].startswith("bound over all poses")
     page = (out / "design.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 1 + 2 * len(front["members"])
-    assert page.count("The cross, middle of the work volume:") == 2 * len(front["members"])
+    assert page.count(">middle of the work volume<") == 2 * len(front["members"])
     proofs = [path.name for path in (out / "tasks").glob("proof-*/row.json")]
     assert len(proofs) == len(front["members"]) + len(front["dropped"])
     before = files(out)

@@ -148,6 +148,9 @@ def test_setup_on_a_table_draws_the_table(standing):
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_machine_alone_is_drawn_twice(name):
-    text = machine_drawings(Machine.load(name))
+    machine = Machine.load(name)
+    text = machine_drawings(machine)
     assert len(drawings(text)) == 2
-    assert "middle of the work volume" in text
+    check_labels(text)
+    told = [label.replace("−", "-") for kind, *_, label in TEXT.findall(text) if kind == "dimension"]
+    assert told == [f"{axis} {1e3 * value:.2f}" for axis, value in zip("xyz", machine.work.centre, strict=True)]

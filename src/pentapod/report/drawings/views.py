@@ -129,16 +129,13 @@ def machine_drawings(machine: Machine) -> str:
     half = np.array([0.0, 0.0, 0.5 * work.height])
     drawn = ""
     for view in (_from_above(hangs), _from_front(hangs)):
-        flat = view.flat(np.concatenate([bones.points, circle + half, circle - half]))
-        paper = Paper(flat.min(axis=0), flat.max(axis=0), rooms=FRONT)
+        flat = view.flat(np.concatenate([bones.points, circle + half, circle - half, np.zeros((1, 3))]))
+        paper = Paper(flat.min(axis=0), flat.max(axis=0), rooms=FRONT if view.names[1] == "z" else ABOVE)
         for ring in (circle - half, circle + half):
             paper.line(view.flat(ring), LIMIT_COLOUR)
         _draw_machine(paper, view, bones)
-        paper.datum(view.flat(work.centre))
-        paper.label_at(view.flat(work.centre), "middle of the work volume")
-        drawn += paper.svg(
-            f"The machine {view.title}", f"From {view.title.removeprefix('from ')}: {view.caption}; tool upright"
-        )
+        _from_zero(paper, view, work.centre, "middle of the work volume")
+        drawn += paper.svg(f"the machine {view.title}", f"The machine {view.title}: {view.caption}; tool upright")
     return drawn
 
 
@@ -197,18 +194,23 @@ def _in_machine(run: PlannedRun, view: View, part: Outline) -> str:
     paper.area(part.areas, LIMIT_COLOUR, "part")
     paper.lines(part.lines, "currentColor", 0.5)
     _draw_machine(paper, view, bones)
-    centre, datum = view.flat(zero), view.flat(origin)
-    x, y = paper.at(centre)
+    _from_zero(paper, view, origin, "datum")
+    return paper.svg(f"the machine and the part {view.title}", f"In the machine, {view.title}: {view.caption}")
+
+
+def _from_zero(paper: Paper, view: View, point: Floats, name: str) -> None:
+    """Mark a point (3,) and the machine's zero, and draw the dimensions from there; those along x only from above."""
+    zero, place = view.flat(np.zeros(3)), view.flat(point)
+    x, y = paper.at(zero)
     paper.stroke(f"M{x - 8:.1f} {y:.1f}h16M{x:.1f} {y - 8:.1f}v16", 1.2)
     paper.keep((x - 8.0, y - 8.0, x + 8.0, y + 8.0))
-    paper.datum(datum)
-    place = view.coordinates(datum)
-    if not sideways:
-        paper.across(centre, datum, f"{view.names[0]} {words_of(place[0])}")
-    paper.upright(centre, datum, f"{view.names[1]} {words_of(place[1])}")
-    paper.label_at(datum, "datum")
-    paper.label_at(centre, "machine zero")
-    return paper.svg(f"the machine and the part {view.title}", f"In the machine, {view.title}: {view.caption}")
+    paper.datum(place)
+    told = view.coordinates(place)
+    if view.names[1] != "z":
+        paper.across(zero, place, f"{view.names[0]} {words_of(told[0])}")
+    paper.upright(zero, place, f"{view.names[1]} {words_of(told[1])}")
+    paper.label_at(place, name)
+    paper.label_at(zero, "machine zero")
 
 
 def _levels(paper: Paper, run: PlannedRun, view: View) -> None:
