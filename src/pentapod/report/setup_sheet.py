@@ -17,20 +17,25 @@ from pentapod.report.sheet.touch_off import touch_off_points, touch_off_table
 from pentapod.report.words import number
 
 
-def setup_sheet(outcome: Outcome) -> str:
-    """Return the sheet as HTML, for the section on the placement; empty where no placement was found."""
+def setup_drawings(outcome: Outcome) -> str:
+    """Return the drawings of the part in the machine as HTML figures; none where no placement was found."""
     placed = outcome.find(PlacedPath)
     if placed is None:
         return ""
-    table = outcome.job.placement
-    height = table.table_z_mm if table.mode == "table" else None
-    surface = None if height is None else 1e-3 * height
     held, mesh = held_mesh(outcome, placed), outcome.find(Mesh)
-    views = placement_views(mesh, placed, outcome.machine, surface, held)
+    return placement_views(mesh, placed, outcome.machine, _surface(outcome), held)
+
+
+def setup_sheet(outcome: Outcome) -> str:
+    """Return what stands below the drawings, as HTML; empty where no placement was found."""
+    placed = outcome.find(PlacedPath)
+    if placed is None:
+        return ""
+    mesh = outcome.find(Mesh)
     points = "" if mesh is None else touch_off_table(touch_off_points(mesh, placed, outcome.machine))
     rows = "".join(_row(limit) for limit in active_limits(placed)[: DETAIL.limits])
     return (
-        f'<p>{_standing(mesh, placed, outcome, height)}</p><div class="views">{views}</div>{points}'
+        f"<p>{_standing(mesh, placed, outcome)}</p>{points}"
         f"<h3>Margins along the path</h3>{margin_band(placed.tips, placed.margins, placed.margin_names)}"
         '<p class="hint">Height: the smallest margin (0: a limit, about 1: comfortable). Colour: the nearest limit; '
         "point at it for its name.</p>"
@@ -40,10 +45,16 @@ def setup_sheet(outcome: Outcome) -> str:
     )
 
 
-def _standing(mesh: Mesh | None, placed: PlacedPath, outcome: Outcome, height: float | None) -> str:
+def _surface(outcome: Outcome) -> float | None:
+    """Return the height of the table, metres; None where the job names none."""
+    table = outcome.job.placement
+    return table.si.table_z if table.mode == "table" else None
+
+
+def _standing(mesh: Mesh | None, placed: PlacedPath, outcome: Outcome) -> str:
     """Return where the table is, or where it would have to be."""
-    if height is not None:
-        return f"The part stands on the table, at z = {number(height, 'mm')}."
+    if (surface := _surface(outcome)) is not None:
+        return f"The part stands on the table, at z = {number(from_si(surface, 'mm'), 'mm')}."
     if mesh is None:
         return ""
     z = placed.placement.transform.apply(mesh.vertices)[:, 2]
