@@ -25,7 +25,7 @@ RAMP = ((0.0, "#5c0019"), (0.25, "#b5371c"), (0.55, "#e39a2d"), (1.0, "#8dd6be")
 LIMIT_COLOUR = "#d2413a"
 QUIET_COLOUR = "#8a8f98"
 HELD_COLOUR = "#a08a6a"
-PART_COLOUR = "#cbd4de"
+PART_COLOUR = "#b9b4aa"
 
 
 @dataclass(frozen=True)

@@ -28,14 +28,20 @@ def setup_drawings(outcome: Outcome) -> str:
 
 def setup_sheet(outcome: Outcome) -> str:
     """Return what stands below the drawings, as HTML; empty where no placement was found."""
+    placed, mesh = outcome.find(PlacedPath), outcome.find(Mesh)
+    if placed is None:
+        return ""
+    points = "" if mesh is None else touch_off_table(touch_off_points(mesh, placed, outcome.machine))
+    return f"<p>{_standing(mesh, placed, outcome)}</p>{points}"
+
+
+def margins_along_path(outcome: Outcome) -> str:
+    """Return the margins along the path and the nearest limits, as HTML; empty where no placement was found."""
     placed = outcome.find(PlacedPath)
     if placed is None:
         return ""
-    mesh = outcome.find(Mesh)
-    points = "" if mesh is None else touch_off_table(touch_off_points(mesh, placed, outcome.machine))
     rows = "".join(_row(limit) for limit in active_limits(placed)[: DETAIL.limits])
     return (
-        f"<p>{_standing(mesh, placed, outcome)}</p>{points}"
         f"<h3>Margins along the path</h3>{margin_band(placed.tips, placed.margins, placed.margin_names)}"
         '<p class="hint">Height: the smallest margin (0: a limit, about 1: comfortable). Colour: the nearest limit; '
         "point at it for its name.</p>"

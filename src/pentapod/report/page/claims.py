@@ -93,12 +93,17 @@ def _nearest(claims: Sequence[Certificate], unjudged: Sequence[NotJudged]) -> tu
     shares = [(share, c) for c in claims if (share := used_share(c)) is not None and c.value]
     if shares:
         share, claim = max(shares, key=lambda pair: pair[0])
-        return f"{claim.claim}: {100.0 * share:.0f} % of what is allowed", share
+        return f"{claim.claim}: {_percent(share)} of what is allowed", share
     rooms = [c for c in claims if c.value is not None and c.bound is not None and c.unit == "mm" and c.value > c.bound]
     if rooms:
         claim = min(rooms, key=lambda c: abs((c.value or 0.0) - (c.bound or 0.0)))
         return f"{claim.claim}: {number((claim.value or 0.0) - (claim.bound or 0.0), claim.unit)} to spare", None
     return f"{len(claims)} {'claim' if len(claims) == 1 else 'claims'}", None
+
+
+def _percent(share: float) -> str:
+    """Return a share below one, which is not written as 100 %."""
+    return f"{100.0 * share:.0f} %" if share < 0.995 else f"{min(100.0 * share, 99.9):.1f} %"
 
 
 def _measured(claim: Certificate) -> str:

@@ -29,7 +29,7 @@ from pentapod.report.page.keys import SEGMENT_KINDS, Keys
 from pentapod.report.page.plots import bucket_words, plots_of
 from pentapod.report.page.preparations import facts, preparations, provenance
 from pentapod.report.page.scene import scene_of
-from pentapod.report.setup_sheet import setup_drawings, setup_sheet
+from pentapod.report.setup_sheet import margins_along_path, setup_drawings, setup_sheet
 from pentapod.report.signals import Signals
 from pentapod.report.template import write_page
 from pentapod.report.worst import worst_places
@@ -43,12 +43,13 @@ from pentapod.verify.surface.surface_left import SURFACE_LEFT
 def write_report(outcome: Outcome, path: str | Path) -> Path:
     """Write report.html on a run and return its path. Raises InputError where it cannot be written."""
     run, packed = _Run(outcome), Packed()
+    motion = run.motion(packed)
     page = {
         "scene": scene_of(packed, outcome, run.signals, run.machine),
-        "motion": run.motion(packed),
+        "motion": motion,
         "plots": None if run.signals is None else plots_of(packed, run.signals, run.machine),
     }
-    return write_page(path, "page.html.j2", page, packed, **_context(run))
+    return write_page(path, "page.html.j2", page, packed, **_context(run, motion))
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +118,7 @@ class _Run:
         }
 
 
-def _context(run: _Run) -> dict[str, Any]:
+def _context(run: _Run, motion: dict[str, Any] | None) -> dict[str, Any]:
     """Return the variables of the template."""
     outcome, signals = run.outcome, run.signals
     placed, program, verdict = outcome.find(PlacedPath), outcome.find(Program), outcome.verdict
@@ -139,7 +140,7 @@ def _context(run: _Run) -> dict[str, Any]:
         "sentence": sentence(run.kinds, total) if run.kinds else "",
         "least": None if signals is None else run.least,
         "left": next((c for c in verdict.certificates if c.claim == SURFACE_LEFT), None),
-        "colouring": [] if signals is None else ("key.margin", "key.share", "key.cause", "key.deviation", "key.force"),
+        "scales": [] if motion is None else motion["scales"],
         "legs": [leg_colour(k) for k in range(outcome.machine.robot.n_legs)],
         "worst": [] if signals is None else worst_places(signals, run.machine),
         "story": outcome.find(Explanation),
@@ -149,6 +150,7 @@ def _context(run: _Run) -> dict[str, Any]:
         "one_of_several": outcome.find(Piece) is not None,
         "drawings": setup_drawings(outcome),
         "setup_sheet": setup_sheet(outcome),
+        "margins": margins_along_path(outcome),
         "chosen_by": "" if placed is None else placed.placement.chosen_by,
         "component": "" if placed is None else str(placed.component),
         "component_signs": (

@@ -18,8 +18,8 @@ export class Machine extends Group {
   }
 
   _addBase() {
-    const { rim, legs, up, legRadius } = this.data, wide = Math.max(0.12 * rim.radius, 2 * legRadius), thick = 0.06 * rim.radius;
-    const [inner, outer] = [rim.radius - wide, rim.radius + wide / 3];
+    const { rim, legs, up, legRadius } = this.data, wide = Math.max(0.05 * rim.radius, 2.5 * legRadius), thick = 0.02 * rim.radius;
+    const [inner, outer] = [rim.radius - wide / 2, rim.radius + wide / 2];
     const ring = turned([[inner, 0], [outer, 0], [outer, 0], [outer, thick], [outer, thick], [inner, thick], [inner, thick], [inner, 0]], matt(INK.base, { side: DoubleSide }), 96);
     const away = new Vector3(...rim.normal).normalize();
     if (away.z * up < 0) away.negate(); // above what hangs from it, below what stands on it
@@ -29,7 +29,7 @@ export class Machine extends Group {
     this.bases.forEach((at, k) => {
       const joint = ball(1.8 * legRadius, matt(legs[k].colour)), name = badge(`${k + 1}`, legs[k].colour);
       joint.position.copy(at);
-      name.position.copy(at).addScaledVector(away, thick + 5 * legRadius);
+      name.position.copy(at).addScaledVector(away, thick + 6 * legRadius);
       this.add(joint, name);
     });
   }

@@ -139,14 +139,14 @@ function onPlots(plots, motion, clock) {
   plots.mark(clock.now);
 }
 
-/** Paper is white, and as wide as it is. What is folded is opened, but for long words on how a claim was judged. */
+/** Paper is white, and as wide as it is. What is folded is opened, but for what only helps on a screen. */
 function onPaper(plots, view) {
   let folded = [];
   addEventListener("beforeprint", () => {
-    folded = [...document.querySelectorAll("details:not([open]):not(.method)")];
+    folded = [...document.querySelectorAll("details:not([open]):not(.method):not(.screen)")];
     folded.forEach((details) => { details.open = true; });
     setPaper(true);
-    plots?.resize(PAPER_PX);
+    plots?.toPaper(PAPER_PX);
     plots?.redraw();
     view?.draw();
   });

@@ -3,7 +3,7 @@ import uPlot from "uplot";
 import style from "uplot/dist/uPlot.min.css";
 import { colour, element, short, swatch } from "./theme.js";
 
-const FONT = "12px system-ui, sans-serif", ROW_PX = 118, FOOT_PX = 40;
+const FONT = "12px system-ui, sans-serif", ROW_PX = 118, FOOT_PX = 40, ON_PAPER_PX = 76;
 
 export class Plots {
   /** holder; data: the page's `plots`; arrays; onPick(x) is told of a click. */
@@ -80,11 +80,17 @@ export class Plots {
   /** Show or hide a series of the rows that are grouped: a leg. */
   showGroup(number, isShown) { for (const plot of this.rows) if (plot.grouped) plot.setSeries(number + 1, { show: isShown }); }
 
-  resize(width = this.holder.clientWidth) {
+  resize(width = this.holder.clientWidth, height = ROW_PX) {
     if (width < 100) return;
-    for (const plot of this.rows) if (plot.width !== width) plot.setSize({ width, height: plot.height });
+    this.rows.forEach((plot, k) => {
+      const size = { width, height: height + (k === this.rows.length - 1 ? FOOT_PX : 0) };
+      if (plot.width !== size.width || plot.height !== size.height) plot.setSize(size);
+    });
     this.mark(this.mark_);
   }
+
+  /** Be as wide as paper, and lower. */
+  toPaper(width) { this.resize(width, ON_PAPER_PX); }
 
   redraw() { for (const plot of this.rows) plot.redraw(); }
 }

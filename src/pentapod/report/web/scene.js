@@ -8,7 +8,7 @@ import { surface } from "./solids.js";
 const NEAR_PX = 8; // of a click from the path
 const ROOM = 1.07; // around what a view holds
 // Where one looks from: to the right, to the front, upwards.
-const VIEWS = { machine: [0.5, 1, 0.32], part: [0.45, 0.75, 0.75], above: [0, 0.001, 1], side: [0, 1, 0.02] };
+const VIEWS = { machine: [0.45, 1, 0.2], part: [0.45, 0.8, 0.7], above: [0, 0.001, 1], side: [0, 1, 0.02] };
 
 export class View {
   /** canvas; data: the page's `scene`; arrays; keys: of the motion, or null. Throws where there is no WebGL. */
@@ -29,10 +29,10 @@ export class View {
   }
 
   _light() {
-    const sky = new HemisphereLight("#ffffff", "#8d95a3", 1.7);
+    const sky = new HemisphereLight("#ffffff", "#7d8593", 1.6);
     sky.position.set(0, 0, this.up);
-    this.scene.add(sky, new AmbientLight("#ffffff", 0.4));
-    for (const [x, y, z, strength] of [[0.6, 0.7, 1, 1.9], [-1, 0.3, 0.35, 0.7]]) {
+    this.scene.add(sky, new AmbientLight("#ffffff", 0.25));
+    for (const [x, y, z, strength] of [[0.7, 0.9, 1, 1.5], [-1, 0.3, 0.3, 0.5]]) {
       const light = new DirectionalLight("#ffffff", strength);
       light.position.set(x, -this.up * y, this.up * z);
       this.scene.add(light);

@@ -56,7 +56,7 @@ export function badge(text, ink) {
   const map = new CanvasTexture(canvas);
   map.colorSpace = SRGBColorSpace;
   const sprite = new Sprite(new SpriteMaterial({ map, sizeAttenuation: false, depthTest: false, transparent: true }));
-  sprite.scale.setScalar(0.03);
+  sprite.scale.setScalar(0.023);
   return sprite;
 }
 
