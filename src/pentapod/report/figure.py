@@ -9,8 +9,8 @@ from typing import Any
 LEG_COLOURS = ("#296cb8", "#c88600", "#2aa58f", "#b64165", "#8c8dd3", "#7b6938")
 """Colours of the legs, the same in every figure.
 
-On a white and on a dark page at least 3 to 1 in contrast, and for protanopes, deuteranopes and tritanopes, too, at least
-15 apart (CIELAB).
+Their contrast is at least 3 to 1 on a white and on a dark page, and they are at least 15 apart (CIELAB), also for
+protanopes, deuteranopes and tritanopes.
 """
 
 KIND_COLOURS = ("#7995c1", "#0d71b1", "#ce8300", "#bf4c00", "#b86b91", "#069d6e")

@@ -1,4 +1,4 @@
-"""Arrays for a page's script: quantised, as differences, bytes in planes, one gzip, base64. `web/unpack.js` reads them."""
+"""Arrays for a page's script: quantised, as differences, bytes in planes, gzip, base64; `web/unpack.js` reads them."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Packed:
 
 
 def by_first_use(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
-    """Return the same surface, its vertices in the order in which the faces name them, without those that none names."""
+    """Return the same surface, its vertices in the order in which the faces name them; unused ones are left out."""
     used, first, inverse = np.unique(faces.ravel(), return_index=True, return_inverse=True)
     order = np.argsort(first, kind="stable")
     place = np.empty_like(order)

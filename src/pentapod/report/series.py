@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Floats, Ints
 from pentapod.report.pack import Packed
 
 
@@ -54,7 +54,7 @@ def packed_rows(packed: Packed, x: Floats, rows: Sequence[Row], label: str, unit
     return {"x": "plot.x", "rows": shown, "label": label, "unit": unit}
 
 
-def bucket_edges(count: int, buckets: int) -> Floats:
+def bucket_edges(count: int, buckets: int) -> Ints:
     """Return where (B + 1,) buckets of as many of `count` members each begin, and where the last ends."""
     return np.linspace(0, count, max(1, min(buckets, count // 2)) + 1).astype(np.intp)
 
@@ -72,7 +72,7 @@ def extremes(values: Floats, buckets: int) -> Floats:
 
 
 def bucket_places(x: Floats, buckets: int) -> Floats:
-    """Return (2 · B,) at which `extremes` are drawn: a quarter into each bucket of x (N,), and a quarter before its end."""
+    """Return (2 · B,) where `extremes` are drawn: at one and at three quarters of each bucket of x (N,)."""
     edges = bucket_edges(len(x), buckets)
     ends = np.append(x, x[-1])[edges]
     return (ends[:-1, None] + np.diff(ends)[:, None] * (0.25, 0.75)).ravel()

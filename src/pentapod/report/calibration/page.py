@@ -60,4 +60,6 @@ def residual_plots(packed: Packed, found: Identified) -> dict[str, Any]:
         Row("residual of the legs, um", residuals, legs, grouped=True),
         Row("error of a pose held out, um", held_out, [Curve("held out", QUIET_COLOUR, style="bars")], low=0.0),
     ]
-    return packed_rows(packed, np.asarray(found.measured.lines, dtype=np.float64), rows, "line of the measurements file")
+    return packed_rows(
+        packed, np.asarray(found.measured.lines, dtype=np.float64), rows, "line of the measurements file"
+    )

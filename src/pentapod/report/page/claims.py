@@ -18,7 +18,7 @@ KINDS = (
 )
 
 _BY_BEGINNING = (
-    (0, ("tip deviation", "axis deviation", "toolpath covered", "starts at the toolpath", "ends at the toolpath", "pieces")),
+    (0, ("tip deviation", "axis deviation", "toolpath covered", "starts at the toolpath", "ends at the toolpath", "every cut")),
     (1, ("gouge", "surface left")),
     (2, ("clearance",)),
     (3, ("leg", "base joint", "platform joint", "passive limb", "component kept", "guides", "tip ", "axis ")),
@@ -64,14 +64,14 @@ def kind_of(claim: str) -> int:
 
 
 def grouped(certificates: Sequence[Certificate], not_judged: Sequence[NotJudged]) -> list[Group]:
-    """Return the kinds that have claims; those of other packages come last."""
+    """Return the kinds that have claims, those with failures first, and last the claims of other packages."""
     groups: list[Group] = []
     for kind, title in enumerate((*KINDS, "Further claims")):
         claims = sorted((c for c in certificates if kind_of(c.claim) == kind), key=lambda c: c.passed)
         unjudged = tuple(n for n in not_judged if kind_of(n.claim) == kind)
         if claims or unjudged:
             groups.append(Group(title, tuple(claims), unjudged, *_nearest(claims, unjudged)))
-    return groups
+    return sorted(groups, key=lambda group: group.passed)
 
 
 def used_share(claim: Certificate) -> float | None:

@@ -47,9 +47,9 @@ OPTIONS = KeyOptions()
 class Keys:
     """Rows (K,) of a program, and what is shown of each.
 
-    beside (B,): legs whose joints are not on the tool axis; joints (K, B, 3), metres. Of the rows from a key to the
-    next: margins, the smallest, nearest, its limit, and deviations, the largest, metres. shares: of the feed; forces: on
-    the leg with the largest, for a force of 1 N on the tip in the worst direction.
+    beside (B,): legs whose joints are not on the tool axis; joints (K, B, 3), metres. margins, nearest, deviations: the
+    smallest margin, its limit, and the largest deviation, metres, from a key to the next. shares: of the feed. forces:
+    of the leg with the largest, for a force of 1 N on the tip in the worst direction.
     """
 
     rows: Ints

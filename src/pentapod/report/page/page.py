@@ -109,7 +109,12 @@ class _Run:
             "ramp": RAMP,
             "causes": [{"name": name, "kind": kind_of(name)} for name in signals.cause_names],
             "kinds": [
-                {"name": kind.name, "colour": kind.colour, "seconds": kind.seconds, "told": words.duration(kind.seconds)}
+                {
+                    "name": kind.name,
+                    "colour": kind.colour,
+                    "seconds": kind.seconds,
+                    "told": words.duration(kind.seconds),
+                }
                 for kind in self.kinds
             ],
             "kind_names": [kind.value for kind in SEGMENT_KINDS],

@@ -28,7 +28,7 @@ def plots_of(packed: Packed, signals: Signals, machine: Machine) -> dict[str, An
         ("leg jerks, mm/s³", jerks, -limits.max_jerk, limits.max_jerk),
     )
     rows = [
-        Row(title, extremes(1e3 * values, buckets), legs, np.unique(1e3 * np.concatenate([low, high])), grouped=True)
+        Row(title, extremes(1e3 * values, buckets), legs, np.unique(1e3 * np.concatenate([low, high])).tolist(), grouped=True)
         for title, values, low, high in by_leg
     ]
     speeds = 6e4 * np.stack([signals.speeds, signals.speed_limits], axis=1)
@@ -37,7 +37,10 @@ def plots_of(packed: Packed, signals: Signals, machine: Machine) -> dict[str, An
     order = np.argsort(signals.margins.min(axis=0), kind="stable")[: DETAIL.margin_curves - 1]
     margins = np.column_stack([signals.smallest_margins, signals.margins[:, order]])
     between = np.column_stack([np.interp(times, times[signals.margin_rows], column) for column in margins.T])
-    names = [Curve("smallest", QUIET_COLOUR), *(Curve(signals.margin_names[k], leg_colour(n)) for n, k in enumerate(order))]
+    names = [
+        Curve("smallest", QUIET_COLOUR),
+        *(Curve(signals.margin_names[k], leg_colour(n)) for n, k in enumerate(order)),
+    ]
     rows.append(Row("margins, 0 at a limit", extremes(between, buckets), names, [0.0]))
     return packed_rows(packed, bucket_places(times, buckets), rows, "time, s", " s")
 
@@ -45,6 +48,4 @@ def plots_of(packed: Packed, signals: Signals, machine: Machine) -> dict[str, An
 def bucket_words(signals: Signals) -> str:
     """Return how exact the plots are."""
     seconds = float(signals.times[-1]) / (len(bucket_edges(len(signals.times), DETAIL.buckets)) - 1)
-    return (
-        f"Of every {1e3 * seconds:.3g} ms the lowest and the highest value are drawn; program.csv has each row."
-    )
+    return f"Of every {1e3 * seconds:.3g} ms the lowest and the highest value are drawn; program.csv has each row."

@@ -46,7 +46,12 @@ def scene_of(packed: Packed, outcome: Outcome, signals: Signals | None, machine:
     It is in the machine where a placement was found or tried, else the workpiece alone. machine: as the program moves
     it.
     """
-    mesh, toolpath, refusal, placed = outcome.find(Mesh), outcome.find(Toolpath), outcome.refusal, shown_placement(outcome)
+    mesh, toolpath, refusal, placed = (
+        outcome.find(Mesh),
+        outcome.find(Toolpath),
+        outcome.refusal,
+        shown_placement(outcome),
+    )
     transform = RigidTransform.identity() if placed is None else placed.placement.transform
     scene: dict[str, Any] = {
         "up": 1 if placed is None or machine.work.centre[2] < 0.0 else -1,
@@ -54,7 +59,7 @@ def scene_of(packed: Packed, outcome: Outcome, signals: Signals | None, machine:
     }  # fmt: skip
     if mesh is not None:
         scene["meshes"].append(_part(packed, mesh, transform))
-        scene["lines"] += _faults(packed, mesh, transform)
+        scene["lines"] += fault_lines(packed, mesh, transform)
     if placed is not None:
         beside = np.zeros(0, dtype=np.intp)
         if signals is not None:
@@ -77,7 +82,9 @@ def scene_of(packed: Packed, outcome: Outcome, signals: Signals | None, machine:
         shown = toolpath if placed is None else placed
         tips = 1e3 * (shown.tips + LIFT_M * shown.axes)
         if refusal is not None:
-            scene["lines"].append(_polyline(packed, "toolpath", tips, np.ones(len(tips), dtype=np.bool_), QUIET_COLOUR, FINE))
+            scene["lines"].append(
+                _polyline(packed, "toolpath", tips, np.ones(len(tips), dtype=np.bool_), QUIET_COLOUR, FINE)
+            )
             scene["dots"] += _exceeded(packed, tips, refusal)
         elif (setups := outcome.find(SetUps)) is not None:
             scene["lines"] += _pieces(packed, toolpath, tips, [part.piece for part in setups.parts])
@@ -91,7 +98,7 @@ def shown_placement(outcome: Outcome) -> PlacedPath | None:
 
 
 def machine_data(machine: Machine, tool: Sequence[Solid], beside: Ints) -> dict[str, Any]:
-    """Return the machine's bodies; beside: legs whose joints come with each pose, since they are not on the tool axis."""
+    """Return the machine's bodies; beside: legs with joints off the tool axis, which come with each pose."""
     robot, bodies, rim = machine.robot, machine.bodies, 1e3 * base_rim(machine, 4)
     first, second = rim[1] - rim[0], rim[2] - rim[0]
     centre = 1e3 * robot.base_joints.mean(axis=0)
@@ -131,7 +138,7 @@ def machine_data(machine: Machine, tool: Sequence[Solid], beside: Ints) -> dict[
 
 
 def _part(packed: Packed, mesh: Mesh, transform: RigidTransform) -> dict[str, Any]:
-    """Return the part. Its vertices stay in its own frame: neighbours there differ in few digits, which packs better."""
+    """Return the part. Its vertices stay in its own frame: there neighbours differ less, which packs better."""
     most = DETAIL.facets
     while True:
         vertices, faces = thinned_mesh(mesh.vertices, mesh.faces, most)
@@ -161,7 +168,7 @@ def _table(outcome: Outcome, mesh: Mesh | None, transform: RigidTransform) -> di
     return {"z": float(table.table_z_mm), "centre": (0.5 * (low + high)).tolist(), "half": half, "thick": thick}
 
 
-def _faults(packed: Packed, mesh: Mesh, transform: RigidTransform) -> list[dict[str, Any]]:
+def fault_lines(packed: Packed, mesh: Mesh, transform: RigidTransform) -> list[dict[str, Any]]:
     """Return the edges of each fault that the mesh has, thinned for display."""
     lines: list[dict[str, Any]] = []
     for k, (name, edges) in enumerate(fault_edges(mesh.vertices, mesh.topology).items()):
