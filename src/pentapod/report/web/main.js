@@ -37,7 +37,8 @@ function viewOf(scene, arrays, motion) {
   try {
     return new View($("canvas"), scene, arrays, motion);
   } catch (error) {
-    $("stage").replaceWith(element("p", { className: "hint", textContent: "This browser has no WebGL: the machine cannot be shown in 3D. Drawings, plots and numbers do not need it." }));
+    $("stage").hidden = true; // its size and its legend are asked for, still
+    $("stage").before(element("p", { className: "hint", textContent: "This browser has no WebGL: the machine cannot be shown in 3D. Drawings, plots and numbers do not need it." }));
     console.info(error.message);
     return null;
   }
