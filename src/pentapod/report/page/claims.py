@@ -18,7 +18,8 @@ KINDS = (
 )
 
 _BY_BEGINNING = (
-    (0, ("tip deviation", "axis deviation", "toolpath covered", "starts at the toolpath", "ends at the toolpath", "every cut")),
+    (0, ("tip deviation", "axis deviation", "toolpath covered", "starts at the toolpath", "ends at the toolpath")),
+    (0, ("every cut",)),
     (1, ("gouge", "surface left")),
     (2, ("clearance",)),
     (3, ("leg", "base joint", "platform joint", "passive limb", "component kept", "guides", "tip ", "axis ")),

@@ -28,7 +28,7 @@ def plots_of(packed: Packed, signals: Signals, machine: Machine) -> dict[str, An
         ("leg jerks, mm/s³", jerks, -limits.max_jerk, limits.max_jerk),
     )
     rows = [
-        Row(title, extremes(1e3 * values, buckets), legs, np.unique(1e3 * np.concatenate([low, high])).tolist(), grouped=True)
+        Row(title, extremes(1e3 * values, buckets), legs, np.unique([1e3 * low, 1e3 * high]).tolist(), grouped=True)
         for title, values, low, high in by_leg
     ]
     speeds = 6e4 * np.stack([signals.speeds, signals.speed_limits], axis=1)

@@ -85,14 +85,15 @@ export class Machine extends Group {
     });
   }
 
-  /** Points that hold the base, for the views. */
+  /** Points that hold the base and the platform where it is, for the views. */
   get bounds() {
     const { rim } = this.data, away = new Vector3(...rim.normal).normalize(), side = new Vector3(1, 0, 0).projectOnPlane(away).normalize();
     const other = new Vector3().crossVectors(away, side);
-    return Array.from({ length: 24 }, (_, k) => {
+    const joints = this.legs.map(({ joint }) => joint.position.clone());
+    return joints.concat(Array.from({ length: 24 }, (_, k) => {
       const turn = (k * Math.PI) / 12, r = 1.12 * rim.radius;
       return new Vector3(...rim.centre).addScaledVector(side, r * Math.cos(turn)).addScaledVector(other, r * Math.sin(turn));
-    });
+    }));
   }
 }
 

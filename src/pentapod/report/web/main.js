@@ -20,8 +20,8 @@ async function begin() {
   Object.assign(window, { report: { page, arrays, motion, clock, view } }); // for the console, and for tests
   if (page.scene) onScene(page, view);
   if (motion) onMotion(page, motion, clock, view);
-  view?.look("machine");
   if (motion) clock.set(page.motion.start);
+  view?.look("machine");
   view?.draw();
   document.documentElement.dataset.drawn = Math.round(performance.now() - started);
   await new Promise((later) => { setTimeout(later); }); // the picture first
