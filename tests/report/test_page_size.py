@@ -49,8 +49,8 @@ def fine_part(*, disorder: bool) -> Mesh:
     return Mesh.of(vertices, faces)
 
 
-def long_motion(machine: Machine) -> tuple[Toolpath, PlacedPath, Signals, Program]:
-    """A raster of 100,000 waypoints on the dome, none on the line of its neighbours, and its program of 400,000 rows."""
+def long_motion(machine: Machine, like: PlacedPath) -> tuple[Toolpath, PlacedPath, Signals]:
+    """A raster of 100,000 waypoints on the dome, none on the line of its neighbours, in 400,000 rows."""
     random = np.random.default_rng(3)
     x = np.linspace(-0.05, 0.05, POINTS)
     place = RigidTransform(np.diag([1.0, -1.0, -1.0]), machine.work.centre)
@@ -58,7 +58,7 @@ def long_motion(machine: Machine) -> tuple[Toolpath, PlacedPath, Signals, Progra
         np.stack([x[:: (-1) ** k], np.full(POINTS, y), height(x, y)], axis=1)
         for k, y in enumerate(np.linspace(-0.05, 0.05, PASSES))
     ])  # fmt: skip
-    tips[:, 2] += 2e-5 * random.standard_normal(len(tips))
+    tips[:, 2] += 8e-5 * random.standard_normal(len(tips))
     axes = np.tile([0.0, 0.0, 1.0], (len(tips), 1))
     segments = (
         Segment(
@@ -77,22 +77,15 @@ def long_motion(machine: Machine) -> tuple[Toolpath, PlacedPath, Signals, Progra
     signals = Signals(
         times=1e-3 * np.arange(len(moved)), legs=legs, rates=rates, accelerations=np.gradient(rates, 1e-3, axis=0),
         tips=moved, axes=along, speeds=np.full(len(moved), 0.02), speed_limits=np.full(len(moved), 0.025),
-        segments=np.minimum(np.arange(len(moved)) // (POINTS * ROWS), PASSES - 1), cutting=np.ones(len(moved), dtype=bool),
-        causes=np.arange(len(moved)) // 900 % 3, cause_names=("feed", "leg 1 jerk", "leg 2 acceleration"), margins=margins,
-        margin_rows=rows, margin_names=tuple(f"margin {k}" for k in range(20)),
+        segments=np.minimum(np.arange(len(moved)) // (POINTS * ROWS), PASSES - 1),
+        cutting=np.ones(len(moved), dtype=bool), causes=np.arange(len(moved)) // 900 % 3,
+        cause_names=("feed", "leg 1 jerk", "leg 2 acceleration"), margins=margins, margin_rows=rows,
+        margin_names=tuple(f"margin {k}" for k in range(20)),
     )  # fmt: skip
-    component = machine.robot.branches[0]
-    placed = PlacedPath(
-        toolpath, Placement(place, "by hand"), component, place.apply(tips), np.tile([0.0, 0.0, -1.0], (len(tips), 1)),
-        np.full((len(tips), 1), 0.5), _one_limit(),
-    )  # fmt: skip
-    return toolpath, placed, signals, component
-
-
-def _one_limit():
-    from pentapod.planning.limits.limit import Limit
-
-    return (Limit("leg 1 too long", "mm", "legs"),)
+    down, margins = np.tile([0.0, 0.0, -1.0], (len(tips), 1)), np.full((len(tips), len(like.limits)), 0.5)
+    spot = Placement(place, "by hand")
+    placed = PlacedPath(toolpath, spot, like.component, place.apply(tips), down, margins, like.limits)
+    return toolpath, placed, signals
 
 
 @pytest.mark.slow
@@ -101,10 +94,10 @@ def test_a_page_of_100000_waypoints_and_300000_facets_is_below_three_megabytes(
     make_job, tmp_path, monkeypatch, disorder
 ):
     outcome = run(Job.load(make_job()), tmp_path / "out")
-    machine = outcome.machine
-    toolpath, placed, signals, _ = long_motion(machine)
-    program = outcome.find(Program)
+    program, like = outcome.find(Program), outcome.find(PlacedPath)
     assert program is not None
+    assert like is not None
+    toolpath, placed, signals = long_motion(outcome.machine, like)
     long_program = dataclasses.replace(program, legs=signals.legs)
     mesh = fine_part(disorder=disorder)
     own = {Mesh: mesh, Toolpath: toolpath, PlacedPath: placed, Program: long_program}
