@@ -11,6 +11,9 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.report.pack import Packed
 
+X_STEP = 1e-6
+"""Step of the places along x, as a share of their range."""
+
 
 @dataclass(frozen=True)
 class Curve:
@@ -43,7 +46,7 @@ class Row:
 
 def packed_rows(packed: Packed, x: Floats, rows: Sequence[Row], label: str, unit: str = "") -> dict[str, Any]:
     """Add the arrays of rows over x (N,) to the page's, and return the rest as its script reads it."""
-    packed.numbers("plot.x", x)
+    packed.numbers("plot.x", x, max(float(np.ptp(x)), 1e-12) * X_STEP)
     shown: list[dict[str, Any]] = []
     for k, row in enumerate(rows):
         packed.numbers(f"plot.{k}", row.values)
