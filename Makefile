@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+WEB := src/pentapod/report/web
 # Tests are spread over processes; a numerical library that starts threads of its own would only get in the way.
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
@@ -15,7 +16,7 @@ ORACLES := pytest pytest-xdist hypothesis mpmath rtree pyyaml psutil python-flin
 LOWEST_TESTS := tests/numerics tests/geometry tests/kinematics tests/timing tests/program tests/mesh/query/test_swept_depth.py \
 	tests/toolpath/inputs/test_drawings.py tests/simulate/test_servo.py tests/job/test_pipeline.py
 
-.PHONY: demo test test-all test-lowest lock lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view bench-machines bench-batch bench-design kernels reference pictures site clean
+.PHONY: demo test test-all test-lowest lock lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view bench-machines bench-batch bench-design kernels reference pictures page page-check site clean
 
 demo: $(READY)  ## plan a dome and judge the program; kernels are compiled before, on all cores
 	$(BIN)/pentapod warm-up
@@ -44,10 +45,17 @@ lock:  ## constraints.txt anew: the newest releases that fit together, with the 
 		--no-annotate --no-header pyproject.toml >> out/constraints.txt
 	mv out/constraints.txt constraints.txt
 
-lint: $(READY)
+lint: $(READY) page-check
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
+
+page:  ## the script of the report, from its sources; needs npm
+	cd $(WEB) && npm ci --ignore-scripts --no-fund --no-audit && npm run build
+
+page-check:  ## is the committed script of the report what its sources give? Where npm is installed
+	@if command -v npm >/dev/null; then cd $(WEB) && npm ci --ignore-scripts --no-fund --no-audit && npm run check; \
+	else echo "npm is not installed: the script of the report is not built again; a test compares the digest of its sources"; fi
 
 mutation: $(READY)  ## do the tests of the verdict notice changes of it?
 	$(BIN)/python benchmarks/mutation.py
@@ -101,8 +109,8 @@ reference: $(READY)  ## the pages of docs/reference, from the code
 
 pictures: $(READY)  ## the screenshots of the documentation, from the tests that open a browser
 	mkdir -p out/shots
-	PENTAPOD_SHOTS=out/shots $(BIN)/pytest tests/report/test_report_in_browser.py tests/report/test_sheet_in_browser.py tests/view/test_viewer.py -k "loads or prints or drawn"
-	cp out/shots/report.png out/shots/sheet.png out/shots/view.png docs/
+	PENTAPOD_SHOTS=out/shots $(BIN)/pytest tests/report/test_report_in_browser.py tests/report/test_sheet_in_browser.py tests/view/test_viewer.py -k "drawn or draws or prints"
+	cp out/shots/report.png out/shots/report-first.png out/shots/sheet.png out/shots/view.png docs/
 
 site: $(READY)  ## the documentation as a site, in site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict

@@ -13,7 +13,6 @@ HEAVY = (
     "pandas",
     "toppra",
     "matplotlib",
-    "plotly",
     "trimesh",
     "scipy",
     "pydantic",
@@ -45,7 +44,7 @@ def test_help_is_light(arguments: list[str]) -> None:
 
 def test_every_name_loads_without_the_solvers() -> None:
     code = "import pentapod\nfor name in pentapod.__all__: getattr(pentapod, name)"
-    assert loaded_after(code, ("casadi", "toppra", "matplotlib", "plotly", "trimesh", "numba", "distributed")) == []
+    assert loaded_after(code, ("casadi", "toppra", "matplotlib", "trimesh", "numba", "distributed")) == []
 
 
 def test_the_check_can_fail() -> None:

@@ -1,29 +1,10 @@
-"""Decimation of curves and meshes for display."""
+"""Decimation of meshes for display."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-
-
-def keep_extremes(values: Floats, buckets: int) -> Ints:
-    """Return indices, ascending, of the first, last, lowest and highest value in each of `buckets` runs.
-
-    values (N,); NaN counts as neither. All indices where N is at most 4 · buckets. The thinned curve covers
-    the same pixels and has the same largest and smallest value.
-    """
-    count = len(values)
-    if count <= 4 * buckets:
-        return np.arange(count, dtype=np.intp)
-    edges = np.linspace(0, count, buckets + 1).astype(np.intp)
-    width = int(np.diff(edges).max())
-    index = np.minimum(edges[:-1, None] + np.arange(width), edges[1:, None] - 1)
-    block = values[index]
-    low = np.where(np.isnan(block), np.inf, block).argmin(axis=1)
-    high = np.where(np.isnan(block), -np.inf, block).argmax(axis=1)
-    runs = np.arange(buckets)
-    return np.unique(np.concatenate([edges[:-1], edges[1:] - 1, index[runs, low], index[runs, high]]))
 
 
 def thinned_mesh(vertices: Floats, faces: Ints, most_facets: int) -> tuple[Floats, Ints]:

@@ -16,15 +16,27 @@ from pentapod.report.margin_band import margin_band
 from pentapod.report.words import number
 
 
+def setup_drawings(outcome: Outcome) -> str:
+    """Return the drawings of the part in the machine as HTML figures; none where no placement was found."""
+    run = PlannedRun.of(outcome)
+    return "" if run is None else all_drawings(run)
+
+
 def setup_sheet(outcome: Outcome) -> str:
-    """Return the sheet as HTML, for the section on the placement; empty where no placement was found."""
-    placed, run = outcome.find(PlacedPath), PlannedRun.of(outcome)
-    if placed is None or run is None:
+    """Return what stands below the drawings, as HTML; empty where no placement was found."""
+    run = PlannedRun.of(outcome)
+    if run is None:
         return ""
-    points = touch_off_table(touch_off_points(run))
+    return f"<p>{_standing(run)}</p>{touch_off_table(touch_off_points(run))}"
+
+
+def margins_along_path(outcome: Outcome) -> str:
+    """Return the margins along the path and the nearest limits, as HTML; empty where no placement was found."""
+    placed = outcome.find(PlacedPath)
+    if placed is None:
+        return ""
     rows = "".join(_row(limit) for limit in active_limits(placed)[: DETAIL.limits])
     return (
-        f'<p>{_standing(run)}</p><div class="views">{all_drawings(run)}</div>{points}'
         f"<h3>Margins along the path</h3>{margin_band(placed.tips, placed.margins, placed.margin_names)}"
         '<p class="hint">Height: the smallest margin (0: a limit, about 1: comfortable). Colour: the nearest limit; '
         "point at it for its name.</p>"

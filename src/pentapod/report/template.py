@@ -1,29 +1,40 @@
-"""Pages from templates, with everything that a browser needs in the one file."""
+"""Pages from templates, with everything that a browser needs in the one file. They ask for nothing from elsewhere."""
 
 from __future__ import annotations
 
+import base64
+import hashlib
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from pentapod.base.files import atomic_write
 from pentapod.report import words
-from pentapod.report.figure import PLOT_CONFIG, as_script
+from pentapod.report.figure import as_script
+from pentapod.report.pack import Packed
 
 
-def write_page(path: str | Path, template: str, **context: Any) -> Path:
-    """Write the page of a template of this folder and return its path. Raises InputError: it cannot be written."""
+def write_page(
+    path: str | Path, template: str, page: dict[str, Any] | None = None, packed: Packed | None = None, **context: Any
+) -> Path:
+    """Write the page of a template of this folder and return its path. Raises InputError: it cannot be written.
+
+    page, packed: what the page's script draws (`web/main.js`), and the arrays for it; None for a page without a script.
+    """
     import jinja2  # noqa: PLC0415 - heavy, and only needed here
 
     folder = resources.files("pentapod.report")
-    files = {name: (folder / name).read_text(encoding="utf-8") for name in (template, "style.css", "page.js")}
+    files = {name: (folder / name).read_text(encoding="utf-8") for name in (template, "style.css", "figures.css")}
+    script = "" if page is None else (folder / "web" / "page.min.js").read_text(encoding="utf-8")
+    arrays = Packed() if packed is None else packed
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters.update(number=words.number, duration=words.duration, opening=words.opening)
     text = environment.from_string(files[template]).render(
-        style=files["style.css"],
-        script=files["page.js"],
-        plotly=_plotly() if "{{ plotly" in files[template] else "",
-        plot_config=as_script(PLOT_CONFIG),
+        style=files["style.css"] if page is None else files["style.css"] + files["figures.css"],
+        script=script,
+        policy=_policy(script),
+        page=as_script({**(page or {}), "arrays": arrays.directory}),
+        arrays=arrays.block,
         **context,
     )
     with atomic_write(path) as temporary:
@@ -31,8 +42,10 @@ def write_page(path: str | Path, template: str, **context: Any) -> Path:
     return Path(path)
 
 
-def _plotly() -> str:
-    """Return the JavaScript of figures, which a page without any does not need."""
-    import plotly.offline  # noqa: PLC0415
-
-    return plotly.offline.get_plotlyjs()
+def _policy(script: str) -> str:
+    """Return the Content-Security-Policy: no request, and no script but this one."""
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+    return (
+        f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; base-uri 'none'; "
+        "form-action 'none'"
+    )

@@ -14,24 +14,27 @@ from pentapod.machine.identification.identification import Identified, believed
 from pentapod.machine.identification.sensitivity import numbers_of
 from pentapod.machine.machine import Machine
 from pentapod.report.drawings.colours import QUIET_COLOUR, leg_colour
-from pentapod.report.figure import Figure, as_script, packed, rows_layout
+from pentapod.report.pack import Packed
+from pentapod.report.series import Curve, Row, packed_rows
 from pentapod.report.template import write_page
-
-ROW_PX = 260
 
 
 def write_calibration_report(path: str | Path, found: Identified, machine: Machine, lines: Sequence[str]) -> Path:
     """Write the page and return its path. lines: what is said of the fit. Raises InputError."""
+    packed = Packed()
+    plots = residual_plots(packed, found)
     return write_page(
         path,
         "figures.html.j2",
+        {"plots": plots},
+        packed,
         title=machine.name,
         about="calibration",
         kind=f"pentapod calibration, {found.measured.instrument}",
         summary="What was found",
         lines=[*lines, "", *numbers_table(found, machine)],
         heading="Residuals",
-        figure=as_script(residual_figure(found)),
+        legs=[leg_colour(k) for k in range(found.calibration.residuals.shape[1])],
     )
 
 
@@ -48,19 +51,15 @@ def numbers_table(found: Identified, machine: Machine) -> list[str]:
     return lines
 
 
-def residual_figure(found: Identified) -> Figure:
-    """Return the figure: residuals of the legs, and errors of poses that the fit did not see, by line of the file."""
-    lines = np.asarray(found.measured.lines, dtype=np.float64)
+def residual_plots(packed: Packed, found: Identified) -> dict[str, Any]:
+    """Return the plots: residuals of the legs, and errors of poses that the fit did not see, by line of the file."""
     residuals = from_si(found.calibration.residuals, "um")
-    traces = list[dict[str, Any]]()
-    for leg in range(residuals.shape[1]):
-        look = {"color": leg_colour(leg), "size": 7}
-        data = {"x": packed(lines, "f8"), "y": packed(residuals[:, leg]), "yaxis": "y"}
-        traces.append({"type": "scatter", "mode": "markers", "name": f"leg {leg + 1}", "marker": look, **data})
-    errors = {"x": packed(lines, "f8"), "y": packed(from_si(found.held_out, "um")), "yaxis": "y2"}
-    look = {"color": QUIET_COLOUR}
-    traces.append({"type": "bar", "name": "held out", "marker": look, "showlegend": False, **errors})
-    titles = ["residual of the legs, um", "error of a pose held out, um"]
-    layout = rows_layout(titles, ROW_PX * len(titles), 0.08)
-    layout["xaxis"] = {**layout["xaxis"], "title": {"text": "line of the measurements file"}}
-    return {"data": traces, "layout": {**layout, "hovermode": "closest"}}
+    legs = [Curve(f"leg {k + 1}", leg_colour(k), style="points") for k in range(residuals.shape[1])]
+    held_out = from_si(found.held_out, "um")[:, None]
+    rows = [
+        Row("residual of the legs, um", residuals, legs, grouped=True),
+        Row("error of a pose held out, um", held_out, [Curve("held out", QUIET_COLOUR, style="bars")], low=0.0),
+    ]
+    return packed_rows(
+        packed, np.asarray(found.measured.lines, dtype=np.float64), rows, "line of the measurements file"
+    )

@@ -1,0 +1,187 @@
+"""Keys of the motion: rows of the program between which tip, axis and joints lie on straight lines in time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.geometry.runs import equal_runs
+from pentapod.kinematics.forces import leg_force_map
+from pentapod.machine.leg_ends import leg_ends
+from pentapod.machine.machine import Machine
+from pentapod.planning.placement.placed_path import PlacedPath
+from pentapod.report.figure import DETAIL
+from pentapod.report.pack import Packed
+from pentapod.report.page.causes import KINDS, kind_of
+from pentapod.report.signals import Signals
+from pentapod.toolpath.toolpath import SegmentKind
+from pentapod.verify.replay.free_space import PosedPolyline
+from pentapod.verify.replay.path_matching import match
+
+SEGMENT_KINDS = (SegmentKind.CUT, SegmentKind.LINK, SegmentKind.RAPID)
+
+
+@dataclass(frozen=True)
+class KeyOptions:
+    """How exact the keys are: together they keep 0.02 mm.
+
+    straight_mm: largest distance of tip and joints from the straight lines in time between keys. step_mm: of stored
+    points; axis_step: of components of the stored axis. on_axis_m: distance of a joint from the tool axis up to which
+    it is on it.
+    """
+
+    straight_mm: float = 0.012
+    step_mm: float = 0.005
+    axis_step: float = 1e-5
+    on_axis_m: float = 1e-7
+
+
+OPTIONS = KeyOptions()
+
+
+@dataclass(frozen=True, eq=False)
+class Keys:
+    """Rows (K,) of a program, and what is shown of each.
+
+    beside (B,): legs whose joints are not on the tool axis; joints (K, B, 3), metres. margins, nearest, deviations: the
+    smallest margin, its limit, and the largest deviation, metres, from a key to the next. shares: of the feed. forces:
+    of the leg with the largest, for a force of 1 N on the tip in the worst direction.
+    """
+
+    rows: Ints
+    beside: Ints
+    joints: Floats
+    margins: Floats
+    nearest: Ints
+    shares: Floats
+    deviations: Floats
+    forces: Floats
+
+    @classmethod
+    def of(cls, signals: Signals, machine: Machine, placed: PlacedPath, tolerance: float) -> Keys:
+        """Return the keys of a program. tolerance: of the program against the path, metres."""
+        tips, axes = signals.tips, signals.axes
+        beside = joints_beside(machine, tips, axes)
+        joints = leg_ends(machine, tips, axes)[1][:, beside] if len(beside) else np.zeros((len(tips), 0, 3))
+        far = 1e3 * (machine.tool_length - machine.line_top)
+        shown = np.concatenate([1e3 * tips, far * axes, 1e3 * joints.reshape(len(tips), -1)], axis=1)
+        must = _marked(signals)
+        rows = straight_rows(signals.times, shown, must, OPTIONS.straight_mm)
+        least = np.interp(signals.times, signals.times[signals.margin_rows], signals.smallest_margins)
+        at = np.clip(np.searchsorted(signals.margin_rows, _lowest(least, rows)), 0, len(signals.margin_rows) - 1)
+        position = tips[rows] + machine.tool_length * axes[rows]
+        loads = leg_force_map(machine.robot, position, -axes[rows], machine.tool_length)
+        return cls(
+            rows, beside, joints[rows], np.minimum.reduceat(least, rows), signals.margins[at].argmin(axis=1),
+            signals.speeds[rows] / signals.speed_limits[rows],
+            np.maximum.reduceat(_deviations(signals, placed, tolerance), rows),
+            np.linalg.norm(loads, axis=-1).max(axis=-1),
+        )  # fmt: skip
+
+    def pack(self, packed: Packed, signals: Signals, kinds: Sequence[SegmentKind], period: float) -> None:
+        """Add the arrays of the motion. kinds: of the toolpath's segments; period: of the controller, s."""
+        rows, causes = self.rows, signals.causes[self.rows]
+        packed.numbers("key.time", signals.times[rows], period)
+        packed.numbers("key.tip", 1e3 * signals.tips[rows], OPTIONS.step_mm)
+        packed.numbers("key.axis", signals.axes[rows], OPTIONS.axis_step)
+        if len(self.beside):
+            packed.numbers("key.joints", 1e3 * self.joints.reshape(len(rows), -1), OPTIONS.step_mm)
+        packed.numbers("key.margin", self.margins)
+        packed.numbers("key.share", 100.0 * self.shares, 0.1)
+        packed.numbers("key.deviation", 1e3 * self.deviations)
+        packed.numbers("key.force", self.forces)
+        packed.whole("key.nearest", self.nearest)
+        packed.whole("key.cause", causes)
+        packed.whole("key.segment", signals.segments[rows])
+        order = np.array([SEGMENT_KINDS.index(kind) for kind in kinds])
+        packed.whole("key.kind", order[signals.segments[rows]])
+
+    def scales(self, tolerance: float) -> list[dict[str, Any]]:
+        """Return by what the path can be coloured: name, array, unit, the worst and the best value, words at both ends.
+
+        tolerance: of the program against the path, metres.
+        """
+        strongest, weakest = float(np.nanmax(self.forces)), float(np.nanmin(self.forces))
+        return [
+            _scale("smallest margin", "key.margin", "", 0.0, 0.5, ("0, at a limit", "0.25", "0.5 or more")),
+            _scale("share of the feed", "key.share", " %", 0.0, 100.0, ("0 %", "50 %", "100 % of the feed")),
+            _scale("what limits the motion", "key.cause", "", 0.0, 1.0, ()),
+            _scale(
+                "deviation from the path", "key.deviation", " mm", 1e3 * tolerance, 0.0,
+                (f"{1e3 * tolerance:g} mm, as much as is allowed", "0 mm"),
+            ),
+            _scale(
+                "leg force for 1 N at the tip", "key.force", " N", strongest, weakest,
+                (f"{strongest:.3g} N", f"{weakest:.3g} N"),
+            ),
+        ]  # fmt: skip
+
+
+def _scale(name: str, array: str, unit: str, worst: float, best: float, ends: tuple[str, ...]) -> dict[str, Any]:
+    return {"name": name, "array": array, "unit": unit, "worst": worst, "best": best, "ends": ends}
+
+
+def joints_beside(machine: Machine, tips: Floats, axes: Floats) -> Ints:
+    """Return which legs (B,) end beside the tool axis in some of the poses (N, 3)."""
+    heights = machine.tool_length - machine.robot.offsets
+    feet = tips[:, None] + heights[:, None] * axes[:, None]
+    far = np.linalg.norm(leg_ends(machine, tips, axes)[1] - feet, axis=-1)
+    return np.flatnonzero(far.max(axis=0) > OPTIONS.on_axis_m)
+
+
+def straight_rows(times: Floats, points: Floats, must: Bools, most: float) -> Ints:
+    """Return which rows to keep, ascending, so that those between lie on straight lines in time, within `most`.
+
+    points (N, 3 · k): of each of k points three coordinates. must (N,): rows to keep in any case; the first and the
+    last are kept as well.
+    """
+    keep = must.copy()
+    keep[[0, -1]] = True
+    fixed = np.flatnonzero(keep)
+    open_runs = list(zip(fixed[:-1].tolist(), fixed[1:].tolist(), strict=True))
+    while open_runs:
+        first, last = open_runs.pop()
+        if last - first < 2:
+            continue
+        share = (times[first + 1 : last] - times[first]) / (times[last] - times[first])
+        off = points[first + 1 : last] - points[first] - share[:, None] * (points[last] - points[first])
+        squares = np.square(off).reshape(len(off), -1, 3).sum(axis=-1).max(axis=1)
+        worst = int(squares.argmax())
+        if squares[worst] > most**2:
+            middle = first + 1 + worst
+            keep[middle] = True
+            open_runs += [(first, middle), (middle, last)]
+    return np.flatnonzero(keep)
+
+
+def _marked(signals: Signals) -> Bools:
+    """Return the rows (N,) that are keys in any case: ends of segments, changes of the active limit, least margins."""
+    must = np.zeros(len(signals.times), dtype=np.bool_)
+    turns = np.flatnonzero(np.diff(signals.segments))
+    must[turns] = must[turns + 1] = True
+    must[signals.margin_rows[signals.margins.argmin(axis=0)]] = True
+    kinds = np.array([kind_of(name) for name in signals.cause_names] or [len(KINDS)])[signals.causes]
+    runs = equal_runs(kinds)
+    longest = np.argsort(runs[:, 0] - runs[:, 1], kind="stable")[: DETAIL.cause_changes]
+    must[runs[longest, 0]] = True
+    must[np.minimum(runs[longest, 1], len(must) - 1)] = True
+    return must
+
+
+def _lowest(values: Floats, rows: Ints) -> Ints:
+    """Return where (K,) the lowest value lies from each of the rows to the next."""
+    ends = np.append(rows[1:], len(values))
+    order = np.lexsort((values, np.repeat(np.arange(len(rows)), ends - rows)))
+    return order[rows - rows[0]]
+
+
+def _deviations(signals: Signals, placed: PlacedPath, tolerance: float) -> Floats:
+    """Return the distance (N,) of the tilt centre at each row from the matched place of the toolpath, metres."""
+    centres = signals.tips + placed.toolpath.tilt_centre * signals.axes
+    nominal = placed.placement.transform.rotate(placed.toolpath.axes)
+    path = PosedPolyline(placed.tilt_centres, nominal)
+    return match(PosedPolyline(centres, signals.axes), path, tolerance).distances
