@@ -58,7 +58,7 @@ def simulate_servo(
     if correction is None:
         return Refusal(
             "simulation",
-            "no correction by the pose keeps its margin with these drives",
+            "with these drives no correction by the pose keeps the stability margin",
             remedy="lower the gains or the dead time in [drives], or raise its contour_margin",
         )
     rest = int(np.ceil(options.rest / program.period))
