@@ -11,9 +11,9 @@ from pathlib import Path
 
 from pentapod import Job, PlacedPath, Program, run
 
-folder, stepover = Path(sys.argv[1] if len(sys.argv) > 1 else "out/table"), 12
+folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/table")
 shipped = Path(__file__).resolve().parents[1] / "toolpaths"
-job = Job.load(shipped / "dome.toml").with_(**{"toolpath.stepover_mm": stepover})
+job = Job.load(shipped / "dome.toml")
 print("part    ball mm  margin  time s  verdict")
 for part in ("dome", "saddle", "wavy"):
     for ball in (6, 8):
