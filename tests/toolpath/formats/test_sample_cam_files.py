@@ -26,7 +26,7 @@ def test_a_sample_file_is_what_its_script_writes_and_touches_the_dome(name):
     middle = np.array([0.0, 0.0, -sphere * np.cos(slope)])
     for cut in cuts:
         gap = np.linalg.norm(cut.tips[1:] + ball * cut.axes[1:] - middle, axis=1) - sphere - ball
-        assert np.abs(gap).max() < 2e-7
+        assert np.abs(gap).max() < 4.4e-6, "half way between blocks 2 mm apart the chord is 4.3 µm within the sphere"
         assert (cut.axes[:, 2] > 0.92).all()
 
 
