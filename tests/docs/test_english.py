@@ -11,10 +11,11 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES += sorted((ROOT / "docs" / "howto").glob("*.md"))
-MEAN, LONGEST = 16.0, 45
-"""Words of a sentence, on average and at most. `proofs.md` states theorems, each in one sentence."""
+MEAN, LONGEST = 17.0, 40
+"""Words of a sentence, on average and at most."""
 
-NOT_HELD = {"proofs.md"}
+NOT_HELD = ("proofs.md", "gallery.md")
+"""A theorem is one sentence; captions of pictures are lists."""
 
 
 def sentences(text: str) -> list[str]:
@@ -23,7 +24,7 @@ def sentences(text: str) -> list[str]:
     text = re.sub(r"^(#|\||!\[|    \S).*$", "\n", text, flags=re.M)
     text = re.sub(r"`[^`]*`", "code", re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text))
     paragraphs = re.split(r"\n\s*\n|\n\s*(?=[-*] |\d+\. )", text)
-    found = [re.split(r"(?<=[.!?:;])\s+", " ".join(paragraph.split())) for paragraph in paragraphs]
+    found = [re.split(r"(?<=[.!?])\s+", " ".join(paragraph.split())) for paragraph in paragraphs]
     return [sentence for each in found for sentence in each if len(sentence.split()) > 2]
 
 
