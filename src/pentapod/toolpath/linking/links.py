@@ -33,6 +33,8 @@ class LinkStyle(Value):
     of rapids, radians. rapid_spacing: largest distance between them, metres. blend: largest length of each leg that the
     arc at a corner takes, metres. arc_step: turn between points of arcs, radians. same_corner: corners nearer than this
     are one, metres.
+
+    >>> style = LinkStyle(view=np.array([0.0, 0.0, 1.0]), level=0.05, approach=3e-3, spacing=2e-3, feed=0.05)
     """
 
     view: Floats
