@@ -86,8 +86,8 @@ class Mend(Value):
             return f"second attempt: {' and '.join(ways)}, because the verdict would fail: {'; '.join(self.why)}"
         places = f"{len(self.left_out)} place{'s' if len(self.left_out) > 1 else ''}"
         return (
-            f"second attempt: {from_si(self.length, 'mm'):.3g} mm of cut ({100.0 * self.share:.2g} %) at {places} are left "
-            f"out, because they cannot be done: {'; '.join(self.why)}"
+            f"second attempt: {from_si(self.length, 'mm'):.3g} mm of cut ({100.0 * self.share:.2g} %) at {places} are "
+            f"left out, because they cannot be done: {'; '.join(self.why)}"
         )
 
 

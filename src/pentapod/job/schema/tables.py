@@ -139,7 +139,7 @@ class ToleranceKeys:
         Key(
             "mm",
             "material above the surface that counts as none; for a stand-off tool, distance from its lines; when left "
-            "out, 1.25 times the ridge between passes (half a stepover for a stand-off tool), plus chordal_mm and path_mm",
+            "out, 1.25 times the ridge between passes (or half a stepover), plus chordal_mm and path_mm",
             gt=0.0,
         ),
     ] = None
