@@ -153,7 +153,7 @@ def test_command_says_that_nothing_holds_and_refuses_another_folder(narrow, tmp_
     text = narrow.read_text(encoding="utf-8").replace("amplification = 4.9", "amplification = 0.5")
     narrow.write_text(text, encoding="utf-8")
     assert run(["design", str(narrow), "-o", str(out), "-j", "1", "-q"]) == 1
-    assert "no design holds" in capsys.readouterr().err
+    assert "no design keeps all needs" in capsys.readouterr().err
     narrow.write_text(text.replace("seed", "seed") + "seed = 2\n", encoding="utf-8")
     assert run(["design", str(narrow), "-o", str(out), "-j", "1"]) == 2
     assert "the folder holds another search" in capsys.readouterr().err

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
@@ -23,12 +24,13 @@ from pentapod.geometry import RigidTransform
 from pentapod.job import Job
 from pentapod.kinematics import Component
 from pentapod.machine import CalibrationRecord, Machine, MeasuredGeometry, geometry_digest, write_calibration
-from pentapod.program import Program, Provenance, write_csv
+from pentapod.program import Program, Provenance, read_csv, write_csv
 
 ROOT = Path(__file__).parents[2]
 MACHINE_TABLES = ["calibration", "guides", "leg_model"]
-LONG = ("setups", "register", "many-jobs", "design")
-GUIDES = [*sorted(ROOT.glob("docs/howto/*.md")), ROOT / "docs" / "tutorial.md"]
+LONG = ("setups", "register", "many-jobs", "design", "quickstart")
+GUIDES = [*sorted(ROOT.glob("docs/howto/*.md")), ROOT / "docs" / "tutorial.md", ROOT / "docs" / "quickstart.md"]
+RUN = [page for page in GUIDES if "```sh\n" in page.read_text(encoding="utf-8")]
 
 
 def made_pages():
@@ -48,22 +50,40 @@ def test_the_reference_is_what_the_code_says():
         assert written == text, f"docs/reference/{name} is out of date: run `make reference`"
 
 
-@pytest.mark.parametrize(
-    "page", [pytest.param(p, marks=[pytest.mark.slow] * (p.stem in LONG), id=p.stem) for p in GUIDES]
-)
-def test_every_command_runs_as_written(page, tmp_path, monkeypatch):
+def expected_seconds(page):
+    """What a guide says that its commands take, on one core."""
+    text = page.read_text(encoding="utf-8")
+    stated = re.search(r"^Expected time: (\d+) (s|min) of one core", text, re.M)
+    assert stated, "a guide with commands says how long they take"
+    return int(stated[1]) * (60 if stated[2] == "min" else 1)
+
+
+@pytest.mark.parametrize("page", [pytest.param(p, marks=[pytest.mark.slow] * (p.stem in LONG), id=p.stem) for p in RUN])
+def test_every_command_runs_as_written(page, tmp_path, monkeypatch, capsys):
+    """In about the time that the guide states; where it shows an output, that is what is printed."""
     shutil.copytree(ROOT / "toolpaths", tmp_path / "toolpaths")
     monkeypatch.chdir(tmp_path)
     for block in blocks(page, "toml"):
         if block.startswith("[start]"):
             (tmp_path / "design.toml").write_text(block, encoding="utf-8")
-    for line in "".join(blocks(page, "sh")).splitlines():
-        words = shlex.split(line)
-        assert words[0] == "pentapod"
-        if words[1] == "view":
-            serve_and_interrupt(words[1:])
-        else:
-            assert run(words[1:]) == 0, line
+    began, shown = time.process_time(), re.compile(r"```sh\n(.*?)```(?:\s*```text\n(.*?)```)?", re.S)
+    for commands, output in shown.findall(page.read_text(encoding="utf-8")):
+        for line in commands.splitlines():
+            words = shlex.split(line)
+            assert words[0] == "pentapod"
+            if words[1] == "view":
+                serve_and_interrupt(words[1:])
+            else:
+                assert run(words[1:]) == 0, line
+        printed = capsys.readouterr().out
+        for line in output.splitlines():
+            assert all(part in printed for part in line.split("…")), f"{commands}prints\n{printed}"
+    assert time.process_time() - began < 60.0 + 4.0 * expected_seconds(page)
+    if page.stem == "tutorial":
+        program = read_csv(tmp_path / "first" / "out" / "program.csv")
+        rows = len(program.legs)
+        played = f"playing {rows} setpoints, which takes {rows * program.period:.3f} s"
+        assert played in page.read_text(encoding="utf-8")
 
 
 def serve_and_interrupt(words):

@@ -165,7 +165,7 @@ def test_a_run_that_went_back_passes_and_its_program_names_what_it_leaves_out(do
     done = run(job, tmp_path / "out", advice=None)
     assert done.passed
     assert calls[0] == ()
-    assert any(stage.name == "mended" and "went back" in stage.remark for stage in done.stages)
+    assert any(stage.name == "mended" and "second attempt" in stage.remark for stage in done.stages)
     program = tmp_path / "out" / "program.csv"
     assert f"left_out = {[list(stretch) for stretch in calls[1]]}" in program.read_text()[:4000]
     again = program_toolpath(job, mesh, program)

@@ -27,7 +27,11 @@ LONGEST_SHOWN = 200
 
 
 class PentapodError(Exception):
-    """Base of every exception that pentapod raises on purpose."""
+    """Base of every exception that pentapod raises on purpose.
+
+    >>> issubclass(InputError, PentapodError), issubclass(RefusalError, PentapodError)
+    (True, True)
+    """
 
 
 class InputError(PentapodError, ValueError):
@@ -35,6 +39,9 @@ class InputError(PentapodError, ValueError):
 
     what: what is wrong. file, key, line, column: where. value: what was found. All are kept as attributes. others: what
     else is wrong in the same file, where a reader goes on after the first error.
+
+    >>> str(InputError("out of range", key="feed.cut_mm_min", value=-1, expected="a positive number"))
+    'feed.cut_mm_min: out of range (got -1); expected a positive number'
     """
 
     others: tuple[InputError, ...] = ()

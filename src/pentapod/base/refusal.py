@@ -101,6 +101,10 @@ class Refusal(Value):
 
     advice: changes of the job that were planned, and passed, the best first (`job.pipeline.run`). Later stages return
     a refusal unchanged, so a chain of stages needs one `unwrap` at its end.
+
+    >>> answer = Refusal("timing", "the motion comes to a standstill", remedy="Look at segment 4")
+    >>> print(answer)
+    timing: the motion comes to a standstill. Look at segment 4
     """
 
     stage: str
@@ -126,7 +130,14 @@ class Refusal(Value):
 
 
 class RefusalError(PentapodError):
-    """A stage refused, and `unwrap` was called on its answer; `refusal` is that answer."""
+    """A stage refused, and `unwrap` was called on its answer; `refusal` is that answer.
+
+    >>> try:
+    ...     Refusal("timing", "the motion comes to a standstill").unwrap()
+    ... except RefusalError as error:
+    ...     print(error.refusal.stage)
+    timing
+    """
 
     def __init__(self, refusal: Refusal) -> None:
         super().__init__(str(refusal))

@@ -2,6 +2,9 @@
 
 The package can be called like its function `batch`, since both have the name `pentapod.batch`. The names below are
 imported when they are first used, so that the processes of the workers start quickly.
+
+>>> for done in batch([Job.load("job.toml")], "runs", workers=2):  # doctest: +SKIP
+...     print(done.status, done.row["cycle_time_s"])
 """
 
 from __future__ import annotations

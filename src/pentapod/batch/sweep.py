@@ -51,7 +51,12 @@ class SweepTables(TomlTable):
 
 @dataclass(frozen=True)
 class Sweep(Value):
-    """A sweep file. jobs: those that are changed; changes: of each task, by the path of the key."""
+    """A sweep file. jobs: those that are changed; changes: of each task, by the path of the key.
+
+    >>> sweep = Sweep.load("sweep.toml")
+    >>> [dict(change) for change in sweep.changes]
+    [{'axis.tilt_deg': 8}, {'axis.tilt_deg': 15}]
+    """
 
     path: Path
     jobs: tuple[Job, ...]

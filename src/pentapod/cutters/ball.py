@@ -13,6 +13,10 @@ class BallCutter(BallEnded):
     """A ball-ended cutter. radius: of the ball; flute: cutting length from the tip, None for the ball alone; metres.
 
     Raises ToolpathError unless the radius is positive and the flute longer than it.
+
+    >>> tool = BallCutter(3e-3, shank=(Cone(0.03, 3e-3, 3e-3),))
+    >>> tool.tilt_centre
+    0.003
     """
 
     flute: Flute = None

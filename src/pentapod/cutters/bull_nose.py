@@ -22,6 +22,9 @@ class BullNose(Mounted):
 
     The contact is on the rounding, or under the tip where the axis is the normal. Raises ToolpathError unless
     0 ≤ corner < radius and the flute is longer than the corner.
+
+    >>> BullNose(5e-3, corner=1e-3, flute=0.015).can_tilt
+    False
     """
 
     radius: Annotated[float, Key("mm", "diameter of the cutter", name="diameter", share=0.5, gt=0.0, le=100.0)]

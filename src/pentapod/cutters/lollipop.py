@@ -18,6 +18,9 @@ class Lollipop(BallEnded):
 
     The neck counts as shank: it must not touch. Raises ToolpathError unless 0 < neck_radius < radius and
     2 radius < reach.
+
+    >>> Lollipop(4e-3, neck_radius=2e-3, reach=0.03).tilt_centre
+    0.004
     """
 
     neck_radius: Annotated[float, Key("mm", "lollipop: diameter of the neck", name="neck", share=0.5, gt=0.0, le=100.0)]

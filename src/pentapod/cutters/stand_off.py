@@ -20,6 +20,9 @@ class StandOff(Mounted):
 
     The shank, from the tip on, is the nozzle. It may lean a little only: the spot grows with the angle. Raises
     ToolpathError for a negative distance.
+
+    >>> StandOff(5e-3).tilt_centre
+    -0.005
     """
 
     largest_lean: ClassVar[float] = float(np.radians(15.0))

@@ -54,7 +54,7 @@ def eased(share: Floats) -> Floats:
 def turned(start: Floats, end: Floats, share: Floats, by: Floats) -> Floats:
     """Return the spherical interpolation (N, 3) at `share` (N,) from unit start (3,) to unit end (3,).
 
-    Nearly opposite directions are joined by way of `by` (3,), unit, or what of it is square to the start.
+    Nearly opposite directions are joined through `by` (3,), unit, or its part perpendicular to the start.
     """
     if float(angle_between(start, end)) < NEARLY_OPPOSITE:
         return partway(np.broadcast_to(start, (len(share), 3)), np.broadcast_to(end, (len(share), 3)), share)

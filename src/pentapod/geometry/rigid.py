@@ -17,6 +17,10 @@ class RigidTransform(Value):
     """x ↦ rotation @ x + translation. rotation (3, 3) proper orthogonal; translation (3,) in metres.
 
     Raises ArrayError where the rotation is not a rotation to 1e-9.
+
+    >>> up = RigidTransform(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 0.5]))
+    >>> up.apply(np.array([0.0, 0.1, 0.1])).tolist()
+    [0.0, -0.1, 0.4]
     """
 
     summary = ("translation",)

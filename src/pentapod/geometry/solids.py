@@ -71,6 +71,9 @@ class Cone(Value):
     """Piece of a shank or holder: a cylinder, or a frustum where the radii differ. Metres.
 
     Raises ToolpathError unless the height and a radius are positive.
+
+    >>> holder = (Cone(0.01, 4e-3, 10e-3), Cone(0.03, 10e-3, 10e-3))
+    >>> tool = BallCutter(3e-3, shank=(Cone(0.03, 3e-3, 3e-3),), holder=holder)
     """
 
     height: float

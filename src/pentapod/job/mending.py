@@ -83,11 +83,11 @@ class Mend(Value):
         if not self.left_out:
             ways = ["the time law was searched for longer"] if self.law else []
             ways += ["the motion keeps nearer to the toolpath"] if self.closer else []
-            return f"went back: {' and '.join(ways)}, since the verdict would fail: {'; '.join(self.why)}"
+            return f"second attempt: {' and '.join(ways)}, because the verdict would fail: {'; '.join(self.why)}"
         places = f"{len(self.left_out)} place{'s' if len(self.left_out) > 1 else ''}"
         return (
-            f"went back: {from_si(self.length, 'mm'):.3g} mm of cut ({100.0 * self.share:.2g} %) at {places} left out, "
-            f"since they cannot be done: {'; '.join(self.why)}"
+            f"second attempt: {from_si(self.length, 'mm'):.3g} mm of cut ({100.0 * self.share:.2g} %) at {places} are "
+            f"left out, because they cannot be done: {'; '.join(self.why)}"
         )
 
 

@@ -25,6 +25,9 @@ class Outcome(Result):
     """Results of a run. stages: in the order of the flow; only the search for advice comes after a refusal.
 
     machine: with the job's tool length and controller settings.
+
+    >>> outcome.find(Program).duration == outcome.find(Trajectory).duration
+    True
     """
 
     summary = ("passed", "refusal")

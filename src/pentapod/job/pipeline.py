@@ -55,6 +55,10 @@ def run(
     done gives an outcome with a refusal, a verdict.json that says so, and no program. The folder changes when the run
     ends: an error or an interruption leaves it as it was. Raises InputError for a bad job, mesh, machine or folder, and
     where another run is writing into the folder.
+
+    >>> outcome = run(Job.load("job.toml"), "out")
+    >>> sorted(path.name for path in Path("out").iterdir())
+    ['manifest.json', 'plan.npz', 'program.csv', 'verdict.json']
     """
     folder = Path(out)
     check_folder(folder)

@@ -41,8 +41,8 @@ from pentapod.verify.surface.surface_left import SURFACE_LEFT
 Writer = Callable[[Outcome, Path], object]
 
 STANDS = (
-    "went back: the tool stays upright, and passes end where the part leans over them, since no lean that was found "
-    "keeps it clear of the part"
+    "second attempt: the tool stays upright, and passes end where the part leans over them, because no lean was found "
+    "that keeps the tool clear of the part"
 )
 """What is said of a job that is done by an upright tool."""
 

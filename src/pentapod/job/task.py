@@ -29,10 +29,10 @@ from pentapod.toolpath import Toolpath
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.verify import Claim, Specification
 
-UPRIGHT = "the tool does not lean, as it would touch the part"
+UPRIGHT = "the tool does not lean, because it would touch the part"
 """What is said of a placement with the toolpath's axes."""
 
-STRAIGHT = "the tool keeps one direction, as it would touch the part"
+STRAIGHT = "the tool keeps one direction, because it would touch the part"
 """What is said of a placement with one axis everywhere."""
 
 

@@ -35,6 +35,9 @@ def judge(
     that together they make every cut once. The program of one set-up alone leaves that "not judged". machine: to be
     used instead of the one that the job names, as in `run`. strict as in `verify`. Raises InputError for a bad job,
     mesh or machine, and where there is no such program.
+
+    >>> judge(Job.load("job.toml"), "out/program.csv").answer
+    'passed'
     """
     path = Path(program)
     files = _programs(path) if path.is_dir() else [path]

@@ -11,7 +11,13 @@ from pentapod.base.errors import ArrayError
 
 
 class Component(NamedTuple):
-    """The signs of w and of S (kinematics notes, section 4): each ±1. Usable where an array (2,) is."""
+    """The signs of w and of S (kinematics notes, section 4): each ±1. Usable where an array (2,) is.
+
+    >>> Component.parse("+-")
+    Component(w=1, s=-1)
+    >>> str(Component(1, -1))
+    '+-'
+    """
 
     w: int
     s: int

@@ -46,6 +46,10 @@ class Machine(Value):
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
     spindle's nose would be above the lowest platform joint.
+
+    >>> machine = Machine.load("desk")
+    >>> machine.robot.n_legs, machine.tool_length
+    (5, 0.198)
     """
 
     summary = ("name",)

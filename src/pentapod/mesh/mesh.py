@@ -33,6 +33,10 @@ class Mesh(Value):
     vertices (V, 3): metres, workpiece frame. faces (F, 3): vertex indices, counterclockwise seen from outside.
     diagnosis: faults found and repaired. crease_angle: radians, see `normals`. exact_normals (F, 3, 3): unit, at the
     facets' corners, where they are known better than from the facets.
+
+    >>> corners = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]])
+    >>> len(Mesh.of(corners, np.array([[0, 1, 2]])).faces)
+    1
     """
 
     vertices: Floats

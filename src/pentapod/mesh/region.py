@@ -27,6 +27,9 @@ class Region(Value):
     80° on the part itself. At π/2 upright walls belong to it, with `WALL_SLACK`; beyond it overhangs do, of which
     strategies leave out what the view does not see. box (2, 3): two opposite corners, metres, or None. Raises
     ToolpathError for a direction of no length, an angle out of range, or a flat box.
+
+    >>> flat = Region(box=((-0.02, -0.02, 0.0), (0.02, 0.02, 0.05)), angle=np.radians(30))
+    >>> passes = RasterOptions(region=flat, stepover=2e-3)
     """
 
     box: Annotated[

@@ -1,4 +1,4 @@
-"""Estimate: about the largest smallest margin of a few points that stand for a path; much cheaper than a plan."""
+"""Estimate: roughly the best smallest margin for a few points of a path; much cheaper than a plan."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class EstimateOptions:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """About the largest smallest margin: that of `candidate`, for one of several kinds of axes, `samples`."""
+    """Roughly the best smallest margin: that of `candidate`, for one of several kinds of axes, `samples`."""
 
     samples: ToolpathSamples
     candidate: Candidate

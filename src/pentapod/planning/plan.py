@@ -79,6 +79,10 @@ def plan(
 
     Returns a Refusal that names limits, waypoints and shortfalls where the part does not fit. An interruption (Ctrl-C)
     ends the search with the best placement so far, if that fits; else KeyboardInterrupt is raised.
+
+    >>> placed = plan(toolpath, machine, constraints=PlacementConstraints.fixture([here])).unwrap()
+    >>> placed.smallest_margin > 0.1
+    True
     """
     problem = PlacementProblem.of(
         _samples(toolpath, tilt, common_axis), machine, constraints, weights,

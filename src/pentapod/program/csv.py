@@ -27,6 +27,9 @@ def write_csv(program: Program, path: str | Path) -> Path:
 
     Lengths are rounded to the resolution of the file, 1e-8 mm; those of `sample` have it already. Raises InputError
     where the file cannot be written.
+
+    >>> write_csv(program, "program.csv").name
+    'program.csv'
     """
     with atomic_write(path) as temporary, temporary.open("wb") as out:
         out.writelines(_pieces(program))
@@ -44,6 +47,9 @@ def read_csv(path: str | Path) -> Program:
     Read in blocks, so that a long program is never in memory as text. Errors are: not a program, an unknown format
     version, a header with a missing or wrong key, a truncated file, a wrong number of columns or rows, NaN, and rows
     whose time is not k · period.
+
+    >>> read_csv(write_csv(program, "program.csv")) == program
+    True
     """
     file = Path(path)
     with _opened(file) as source:

@@ -32,6 +32,8 @@ class Provenance(Value):
     the rows are commands of drives; "" where they are readings of the legs. left_out: pairs of waypoints of the job's
     toolpath between which it makes no cut. upright: whether the tool stands along the view, though the job lets it
     lean.
+
+    >>> source = Provenance(machine.name, machine.digest, "", "0.1.0")
     """
 
     machine: str
@@ -55,6 +57,9 @@ class Program(Result):
     legs (N, n_legs): lengths in metres; row k has the time k · period seconds. interpolation: of the controller between
     rows, "linear", or "cubic": the C2 cubic spline with zero end velocities. component: in which the motion must stay.
     placement: workpiece → machine. rail_positions: of the guides of a reconfigurable machine, metres; None for others.
+
+    >>> program.legs.shape[1], round(program.duration, 1) == round(trajectory.duration, 1)
+    (5, True)
     """
 
     summary = ("duration",)

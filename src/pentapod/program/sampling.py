@@ -34,6 +34,10 @@ def sample(
     The duration of trajectories of `retime` is a whole number of periods; of any other the last row is the end point,
     reached within the last period. placement: the result of `plan`; or workpiece → machine, together with the
     component. provenance: by default the machine and no job. Raises InputError where the component is missing.
+
+    >>> program = sample(trajectory, machine, placed)
+    >>> program.interpolation, program.period
+    ('cubic', 0.001)
     """
     if not isinstance(placement, RigidTransform):
         placed = placement.unwrap()

@@ -137,8 +137,8 @@ def plan_probing(
         points, normals = points[free], normals[free]
     if len(points) < count:
         return Refusal(
-            "probing", f"{len(points)} of the tried points can be touched, {count} are asked",
-            remedy="A longer probe, a thinner stylus, fewer touches, a part that is less misplaced, or elsewhere",
+            "probing", f"only {len(points)} of the points tried can be touched, {count} are asked for",
+            remedy="Take a longer probe, a thinner stylus or fewer touches, or place the part more exactly",
         )  # fmt: skip
     rows, goal = rows_of(points, normals, surface.mesh), rows_of(cut.points, cut.normals, surface.mesh)
     take = chosen(rows, goal, np.zeros((0, 6)), count)

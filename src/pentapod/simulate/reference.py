@@ -20,6 +20,10 @@ class Reference(Value):
     """A program on its machine. Samples are the rows and the times halfway between them: M = 2N − 1.
 
     Raises ProgramError where the program's leg lengths have no pose on this machine.
+
+    >>> reference = Reference(program, machine)
+    >>> reference.tips.shape == (2 * len(program.legs) - 1, 3)
+    True
     """
 
     program: Program
@@ -99,6 +103,9 @@ class Played(Result):
 
     legs (N, n): leg lengths; tips (N, 3), metres; directions (N, 3) of the platform. forces (N, n): of the drives,
     newtons.
+
+    >>> played.legs.shape[1]
+    5
     """
 
     legs: Floats

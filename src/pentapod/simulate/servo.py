@@ -42,6 +42,8 @@ def simulate_servo(
 
     correct: correct the leg commands by the pose. A Refusal says that the loops are unstable, that no correction has
     the margin asked for, or that the legs reach lengths without a pose. Raises InputError for a negative seed.
+
+    >>> played = simulate_servo(Reference(program, machine), seed=1).unwrap()
     """
     from pentapod.simulate.servo_kernels import drive  # noqa: PLC0415  kernels are loaded where they are used
 
@@ -58,7 +60,7 @@ def simulate_servo(
     if correction is None:
         return Refusal(
             "simulation",
-            "no correction by the pose keeps its margin with these drives",
+            "with these drives no correction by the pose keeps the stability margin",
             remedy="lower the gains or the dead time in [drives], or raise its contour_margin",
         )
     rest = int(np.ceil(options.rest / program.period))

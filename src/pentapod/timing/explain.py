@@ -81,6 +81,9 @@ class Explanation(Value):
     most costly first, their times add up to the duration and their costs to the gap; places: the ten most costly;
     uses: share of each limit that the sampled program uses; slow_cuts: where a cut is slower than its feed; slowed:
     pieces that had to be slower than their first law.
+
+    >>> story.duration > story.lower_bound
+    True
     """
 
     duration: float
@@ -132,6 +135,10 @@ def explain(
     """Return the analysis of a trajectory's cycle time, from its profile at the gridpoints.
 
     uses: by `certify`; slow_cuts: by `slow_cuts`; both are only passed on.
+
+    >>> story = explain(trajectory, machine)
+    >>> "feed" in [cause.name for cause in story.causes]
+    True
     """
     profile = trajectory.profile
     taken, steps = np.diff(profile.times), np.diff(profile.stations)

@@ -66,6 +66,10 @@ def retime(
 
     Raises InputError where a margin is not in (0, 0.5), for an unknown engine, for a speed below 0 or next to a dwell,
     or for a speed with a cubic controller whose jerks are not limited.
+
+    >>> trajectory = retime(path, machine).unwrap()
+    >>> trajectory.duration > 0.0
+    True
     """
     _check_options(
         {"velocity_margin": velocity_margin, "acceleration_margin": acceleration_margin},

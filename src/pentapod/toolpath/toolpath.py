@@ -25,7 +25,11 @@ MOST_DRAWN = 800
 
 
 class SegmentKind(StrEnum):
-    """Kind of motion: cut (process on), link (on feed, not cutting), rapid (clear of the part)."""
+    """Kind of motion: cut (process on), link (on feed, not cutting), rapid (clear of the part).
+
+    >>> [kind.name for kind in SegmentKind]
+    ['CUT', 'LINK', 'RAPID']
+    """
 
     CUT = "cut"
     LINK = "link"
@@ -44,6 +48,11 @@ class Segment(Value):
     while cutting, 0 to 1. dwell: at the segment's end, seconds; 0 for an exact stop, None for no stop. words: what the
     file that it was read from says before it: spindle, coolant, tool. Raises ToolpathError for too few poses, a wrong
     feed, power or dwell, or an axis that is not of unit length.
+
+    >>> tips = np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]])
+    >>> cut = Segment(SegmentKind.CUT, tips, np.tile([0.0, 0.0, 1.0], (2, 1)), feed=0.025)
+    >>> len(cut.tips)
+    2
     """
 
     summary = ("kind",)
@@ -85,6 +94,9 @@ class Toolpath(Value):
     0 for a fixed tip. wait: dwell at the first waypoint, seconds. end_words: what the file says after the last segment;
     notes: sentences on how the file was read, for the report. Waypoints are the poses of all segments; the common pose
     of two segments counts once. Raises ToolpathError where two segments do not join, or for a wrong wait.
+
+    >>> {segment.kind.name for segment in toolpath.segments} == {"CUT", "LINK", "RAPID"}
+    True
     """
 
     summary = ("waypoints", "cut_length")

@@ -1,6 +1,10 @@
 """Verification of a program file: it is read, replayed and judged claim by claim, independently of the planner.
 
 The package can be called like its function `verify`, since both have the name `pentapod.verify`.
+
+>>> verdict = verify(program, machine, toolpath, tilt=0.0, path_tolerance=20e-6, axis_tolerance=np.radians(0.5))
+>>> [entry.claim for entry in verdict.not_judged][-1]  # no collision_world was given
+'legs, spindle and tool clear of the surroundings'
 """
 
 import sys

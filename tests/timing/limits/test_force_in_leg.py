@@ -109,7 +109,7 @@ def test_a_force_that_the_weight_alone_exceeds_is_refused():
     limit = ForceInLeg(2.0, 1.6, 15.0)
     result = retime(Path((PATHS["nod"](),)), machine(), limits=(limit,))
     assert isinstance(result, Refusal)
-    assert "standing still there would exceed a limit: 1.41 times of it" in result.cause
+    assert "a limit is exceeded even at rest there: 1.41 times the limit" in result.cause
     assert "force in leg" in result.cause
     assert result.diagnosis[0].constraint.startswith("force in leg")
 

@@ -71,7 +71,7 @@ def test_slowed_is_empty_where_pieces_keep_their_first_law():
 def test_piece_20_times_slower_than_its_first_law_is_refused_with_the_place():
     refusal = timed(400.0)
     assert isinstance(refusal, Refusal)
-    assert "times slower than its first law; piece 1, " in refusal.cause
+    assert "times slower than the first time law; piece 1, " in refusal.cause
     place = float(refusal.cause.split(" mm along the path")[0].rsplit(" ", 1)[1])
     assert place == pytest.approx(150.0, abs=2.0)
     assert "segment 7" in refusal.cause

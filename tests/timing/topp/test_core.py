@@ -95,12 +95,12 @@ def test_failures_name_the_gridpoint_and_the_rows():
     s, rows = np.linspace(0, 1, 11), np.full((11, 2), [1.0, 0.5])
     free = np.full(11, np.inf)
     fast_end = fastest(s, rows, 0 * rows, np.where(s == 1, 9.0, 0.5), x_end=8.0)
-    assert (fast_end.gridpoint, fast_end.reason[:8]) == (9, "from her")
+    assert (fast_end.gridpoint, fast_end.reason[:8]) == (9, "no time ")
     assert fast_end.conflict == (0,)
-    assert fastest(s, rows, 0 * rows, free, x_start=2.5).reason.startswith("the start is faster")
-    assert fastest(s, rows, 0 * rows, free, x_end=2.5).reason.startswith("the start is slower")
+    assert fastest(s, rows, 0 * rows, free, x_start=2.5).reason.startswith("the speed at the start is higher")
+    assert fastest(s, rows, 0 * rows, free, x_end=2.5).reason.startswith("the speed at the start is lower")
     assert fastest(s, rows, 0 * rows, np.ones(11), x_end=2.0).gridpoint == 10
-    assert fastest(s, 0 * rows, 0 * rows, free) == Failure(9, "nothing bounds the speed here")
+    assert fastest(s, 0 * rows, 0 * rows, free) == Failure(9, "no limit bounds the speed here")
     stop = fastest(s, rows, 0 * rows, np.where((s > 0.45) & (s < 0.65), 0.0, 1.0))
     assert stop == Failure(5, "the motion comes to a standstill")
     assert fastest(s, rows, rows * np.where(s == s[4], np.nan, 1)[:, None], free).gridpoint == 4

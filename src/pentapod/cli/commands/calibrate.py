@@ -42,7 +42,7 @@ def calibrate() -> None:
               help="Of each measured coordinate, or of a distance.")  # fmt: skip
 @click.option("--direction-sigma", type=_POSITIVE, default=0.001, show_default=True, metavar="DEG",
               help="Of a measured axis.")  # fmt: skip
-@click.option("-c", "--component", help="In which all poses lie  [default: that of the work volume]")
+@click.option("-c", "--component", help="Component of all poses  [default: that of the work volume]")
 @click.option("--dwell", type=Real(0.0), default=5.0, show_default=True, metavar="S", help="Rest in each pose.")
 @click.option("--seed", type=Whole(0), default=0, show_default=True, help="Of the poses to choose from.")
 @json_option
@@ -64,11 +64,10 @@ def plan_poses(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Choose poses in which MACHINE shall be measured, and write the program that takes it there.
+    """Choose poses in which to measure MACHINE, and write the program that moves it there.
 
-    Of many poses of the work volume those are taken after which the tip is known best. Nothing may stand in the work
-    volume but the instrument's target: the program knows no part and no fixture. What the instrument sees goes into
-    measurements.csv.
+    Chooses the poses of the work volume that tell most about the tip. Nothing but the instrument's target may be in the
+    work volume: the program knows no part and no fixture. Write what the instrument sees into measurements.csv.
     """
     from pentapod.base.refusal import Refusal
     from pentapod.base.units import from_si, to_si
@@ -137,7 +136,7 @@ def fit(
     """Find the geometry that fits MEASUREMENTS.csv best, and write the calibration file.
 
     A machine's file names it: [calibration] file = "calibration.toml". Poses that contradict all others are left out
-    and named; numbers that the poses cannot tell stay as designed, and are named.
+    and named. Numbers that the poses do not determine stay as designed, and are named.
     """
     from pentapod.base.units import from_si
     from pentapod.machine.calibration.calibration_file import write_calibration

@@ -37,7 +37,7 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -
     """Inverse kinematics: leg lengths in mm of a tip X Y Z in mm and a tool axis I J K, machine frame.
 
     The axis points from the tip to the spindle, as in APT; it need not have unit length. Without numbers, CSV
-    is read from stdin: a header "x_mm,y_mm,z_mm,i,j,k", then a pose in each line. Of a machine with a leg model
+    is read from stdin: a header "x_mm,y_mm,z_mm,i,j,k", then a pose in each line. For a machine with a leg model
     the commands of the drives follow, for poses that are visited in this order. Exit code 1 where a leg is
     beyond its stroke (`within_strokes`).
     """

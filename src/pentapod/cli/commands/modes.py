@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 def modes(legs: str, rails: str | None, error_mm: float, machine_name: str, as_json: bool, quiet: bool) -> int:
     """Show which poses of the tool fit the lengths of the legs, and strokes, joints and bodies of the machine.
 
-    After power-on a controller knows the legs' lengths alone. The true pose is always among those that fit, within the
-    error of the readings; where this cannot be proven the command refuses. Exit code 1 there, and where more or fewer
-    than one fits.
+    After power-on a controller knows only the lengths of the legs. The true pose is always among those that fit, within
+    the error of the readings; if this cannot be proven, the command refuses. Exit code 1 then, and if more or fewer
+    than one fit.
     """
     from pentapod.base.refusal import Refusal
     from pentapod.machine import Machine, admissible_modes

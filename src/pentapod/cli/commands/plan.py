@@ -26,8 +26,8 @@ if TYPE_CHECKING:
                    "Can be repeated.")  # fmt: skip
 @click.option("--explain", is_flag=True, help="Print the nearest limits: where, and by how much.")
 @click.option("--advice", type=click.IntRange(0), metavar="N",
-              help="Changes to find with which a job that cannot be done is planned; 0: do not search. "
-                   "1 when left out, but 0 where the error says which unit the part must have.")  # fmt: skip
+              help="How many changes to find for a job that cannot be done; 0: do not search. "
+                   "1 when left out, but 0 if the error already says which unit the part must have.")  # fmt: skip
 @click.option("--placement", type=click.Path(path_type=Path), metavar="FILE",
               help="Fix the part where `pentapod register` found it; writes placed-job.toml, too.")  # fmt: skip
 @json_option
@@ -44,17 +44,17 @@ def plan(
 ) -> int:
     """Plan JOB.toml: write program.csv, verdict.json, report.html, sheet.html and plan.npz.
 
-    The folder changes only when the run ends, so that its files are always of one run. A job that cannot be done leaves
-    no program.csv, nor does a program that fails its verdict: that one is called withheld.csv. Changes of a job that
-    cannot be done are searched for and planned, and those whose verdict passed are printed. A job in several set-ups
-    has a folder of files for each: setup-1, setup-2, and so on.
+    The folder changes only when the run ends, so that its files are always of one run. Only a program that passes its
+    verdict is called program.csv; one that fails is called withheld.csv. If a job cannot be done, changes of it are
+    searched for and planned, and those that pass are printed. A job in several set-ups has a folder for each: setup-1,
+    setup-2, and so on.
 
     Several jobs are planned one after the other, each into a folder of its name in OUT. If one of them cannot be done,
-    the others are planned all the same. The exit code is the largest one. `pentapod batch` uses all cores, and goes on
-    after an interruption.
+    the others are still planned. The exit code is the largest one. `pentapod batch` uses all cores, and goes on after
+    an interruption.
 
-    Ctrl-C during the search for a placement continues with the best one so far, if that fits. During the
-    search for changes it ends that. At any other time it ends the command and changes nothing.
+    Ctrl-C during the search for a placement ends the search, and the best placement so far is used if it fits. During
+    the search for changes it ends that search. At any other time it ends the command and changes nothing.
     """
     asked = Asked(out, changes, explain, advice, placement, as_json, quiet)
     if len(jobs) == 1:

@@ -49,9 +49,10 @@ def register() -> None:
 def fit(touches: Path, job: Path, out: Path, *, as_json: bool, quiet: bool, **given: Any) -> int:
     """Find the part from TOUCHES.csv: the leg lengths at each touch of the probe.
 
-    Writes the placement as a table [placement] for a job, or for --placement of `plan` and `replan`. Prints what is
-    left of each touch, how well the cut surface is known, and touches that do not fit. Exit code 1, and no file, where
-    the touches do not determine the placement: the message names the motion that is open, and further touches.
+    Writes the placement as a table [placement] for a job, or for --placement of `plan` and `replan`. Prints the
+    residual of each touch, how well the cut surface is known, and touches that do not fit. If the touches do not
+    determine the placement, the exit code is 1 and no file is written; the message names the motion, and further
+    touches.
     """
     from pentapod.base.files import atomic_write
     from pentapod.base.units import to_si
@@ -100,9 +101,10 @@ _SIZE = Real(0.0, min_open=True)
 def plan(folder: Path, out: Path, count: int, *, as_json: bool, quiet: bool, **given: Any) -> int:
     """Choose touches for the part of the run in DIR, and write the program that makes them.
 
-    The touches tell most of where the cut surface is; the way to each is clear of part and fixture, and within the
-    machine's limits. Writes probing.ngc (G38.2 of LinuxCNC with the legs as axes), touches.csv, to which that program
-    adds the legs at each trip, and expected.csv: the touches if the part stands as planned, to rehearse `register`.
+    The touches tell most about the place of the cut surface. The way to each is clear of part and fixture, and within
+    the machine's limits. Writes probing.ngc (G38.2 of LinuxCNC with the legs as axes), touches.csv, to which that
+    program adds the legs at each trip, and expected.csv: the touches if the part stands as planned, to rehearse
+    `register`.
     """
     from pentapod.base.files import atomic_write
     from pentapod.base.refusal import Refusal

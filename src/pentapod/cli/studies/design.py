@@ -23,7 +23,7 @@ def design(file: Path, out: Path, workers: int | None, as_json: bool, quiet: boo
 
     Every design on the front keeps every need in its whole work volume, proven by bounds over all poses, and makes the
     parts. Needs the extra `design` (pymoo and Dask). Ctrl-C and SIGTERM keep what is done: the same command goes on,
-    and ends with the same files. Exit code 1 where no design holds.
+    and ends with the same files. Exit code 1 if no design keeps all needs.
     """
     from pentapod.design.design_file import DesignFile
 
@@ -48,5 +48,5 @@ def design(file: Path, out: Path, workers: int | None, as_json: bool, quiet: boo
         lines += [f"  not kept: {'; '.join(member.missing)}" for member in front.dropped]
         click.echo("\n".join([*lines, f"table: {out / TABLE}", f"page: {page}"]))
     if not front.members:
-        click.echo("no design holds: weaker needs, wider ranges, or more generations", err=True)
+        click.echo("no design keeps all needs: try weaker needs, wider ranges, or more generations", err=True)
     return 0 if front.members else 1

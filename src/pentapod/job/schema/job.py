@@ -44,6 +44,11 @@ class Job(Value):
     path: the job file; for a job from values, a name in its folder. mesh_path, fixture_mesh, machine_file and files (by
     their keys in [toolpath]): resolved against its folder. from_file: whether the job is that of its file. asked: the
     job as its file says it, where this one is another way to do it; its digest counts.
+
+    >>> job = Job.load("job.toml")
+    >>> slower = job.with_(**{"feed.cut_mm_min": 1200})
+    >>> job.feed.cut_mm_min, slower.feed.si.cut
+    (1500.0, 0.02)
     """
 
     summary = ("path",)

@@ -38,7 +38,7 @@ class PartKeys:
     ]
     unit: Annotated[
         Literal["mm", "cm", "m", "inch"] | None,
-        Key("", "unit of the numbers in the mesh file: compulsory for STL, PLY and OBJ, which do not state it"),
+        Key("", "unit of the numbers in the mesh file: needed for STL, PLY and OBJ, which do not state it"),
     ] = None
     scale: Annotated[float, Key("", "factor applied to the mesh after its unit", gt=0.0)] = 1.0
     repair: Annotated[
@@ -139,7 +139,7 @@ class ToleranceKeys:
         Key(
             "mm",
             "material above the surface that counts as none; for a stand-off tool, distance from its lines; when left "
-            "out, a ridge (half a stepover) and a quarter, and chordal_mm and path_mm",
+            "out, 1.25 times the ridge between passes (or half a stepover), plus chordal_mm and path_mm",
             gt=0.0,
         ),
     ] = None

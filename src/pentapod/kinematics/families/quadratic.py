@@ -46,6 +46,12 @@ class LinearPentapod(Value, FiveLegs, ProvenByLegEquations):
 
     Raises MachineError: not five attachments or offsets, numbers that are not finite or beyond 1e9, offsets that do not
     fit delta (to 1e-9 of the machine's size), an architecturally singular geometry.
+
+    >>> robot = Machine.load("desk").robot
+    >>> legs = robot.leg_lengths(np.array([0.1, 0.0, 0.28]), np.array([0.0, 0.0, 1.0]))
+    >>> position, direction = robot.pose(legs, Component(1, 1))
+    >>> position.round(6).tolist()
+    [0.1, -0.0, 0.28]
     """
 
     base: Floats

@@ -37,7 +37,12 @@ class Obstacle(Value):
 
 @dataclass(frozen=True, eq=False)
 class CollisionWorld(Value):
-    """Obstacles, and the tool's solids above its cutting part: shank and holder; none where it has neither."""
+    """Obstacles, and the tool's solids above its cutting part: shank and holder; none where it has neither.
+
+    >>> world = CollisionWorld.of(machine, tool, part)
+    >>> world.names(machine)[-2:]
+    ('leg 5', 'spindle')
+    """
 
     obstacles: tuple[Obstacle, ...] = ()
     tool: tuple[Solid, ...] = ()

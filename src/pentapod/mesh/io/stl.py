@@ -35,7 +35,10 @@ def read_stl(path: Path, data: bytes) -> Floats:
 
 
 def write_stl(triangles: Floats, name: str) -> bytes:
-    """Return a binary STL of triangles (F, 3, 3): same numbers, same bytes. name: at most 80 characters of ASCII."""
+    """Return a binary STL of triangles (F, 3, 3): same numbers, same bytes. name: at most 80 characters of ASCII.
+
+    >>> written = Path("copy.stl").write_bytes(write_stl(1e3 * part.vertices[part.faces], "copy"))
+    """
     corners = np.asarray(triangles, dtype=np.float64).astype("<f4")
     sides = corners.astype(np.float64)
     normal = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])

@@ -108,6 +108,9 @@ class LegPath(Result):
     """Pieces in order; the machine rests between them.
 
     starts (P + 1,): station where each begins, and the end. dwells (P + 1,): seconds of rest there.
+
+    >>> len(path.pieces)
+    3
     """
 
     summary = ("length",)
@@ -170,6 +173,8 @@ def leg_path(
     others do not shape the path. The machine stops where a rapid meets another kind of motion, where the toolpath has a
     stop, and at corners that turn by more than `stop_angle` radians. Raises ToolpathError for numbers that are not
     positive. Returns a Refusal for a path without motion.
+
+    >>> path = leg_path(placed, machine, path_tolerance=20e-6, axis_tolerance=np.radians(0.5)).unwrap()
     """
     given = {"path_tolerance": path_tolerance, "axis_tolerance": axis_tolerance, "stop_angle": stop_angle}
     for name, value in given.items():

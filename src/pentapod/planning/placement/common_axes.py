@@ -75,7 +75,7 @@ def with_common_axis(
     progress: Progress = silent,
     options: CommonAxesOptions = OPTIONS,
 ) -> Searched:
-    """Return the problem whose nominal axes give the largest smallest margin, and its search.
+    """Return the problem whose nominal axes make the smallest margin largest, and its search.
 
     problem: with the path's own axes and the cone of the tilt field; limit: largest angle of the tool from them,
     radians. search: returns a problem, maybe on another machine, and its search. without_idle: leaves bodies of the

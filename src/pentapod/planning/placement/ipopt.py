@@ -73,7 +73,7 @@ class IpoptSolver:
     def raise_margin(
         self, start: Candidate, enough: float = np.inf, others: Sequence[Candidate] | None = None
     ) -> Candidate:
-        """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one.
+        """Return a candidate whose smallest margin is largest near `start`, or with `enough`; never a worse one.
 
         others: candidates with which it is compared, of no use here.
         """
@@ -153,7 +153,7 @@ class IpoptSolver:
         return rows, np.union1d(kinds, np.flatnonzero(values.min(axis=0) < level))
 
     def _solve(self, at: Candidate, rows: Ints, kinds: Ints, share: float) -> tuple[RigidTransform, Floats]:
-        """Return placement and coefficients with the largest smallest margin over waypoints `rows`.
+        """Return placement and coefficients whose smallest margin is largest over waypoints `rows`.
 
         share: of the longest step of the placement.
         """

@@ -24,6 +24,9 @@ class Placement(Value):
     """Rigid transform workpiece → machine, and the reason for its choice ("job", "the one with the most room ...").
 
     rail_positions (n,): of a reconfigurable machine, metres; None for other machines.
+
+    >>> placed.placement.transform.translation.tolist() == here.translation.tolist()
+    True
     """
 
     summary = ("chosen_by",)
@@ -44,6 +47,9 @@ class PlacedPath(Result):
 
     tips (N, 3) metres; axes (N, 3) unit, tip → spindle; margins (N, M) of the limits (M,), dimensionless, 0 at a limit.
     common_axis: the direction towards which the tool leans from the toolpath's axes; None where none was chosen.
+
+    >>> str(placed.component), placed.margins.shape == (len(placed.tips), len(placed.limits))
+    ('++', True)
     """
 
     summary = ("smallest_margin", "active_limit")

@@ -1,4 +1,4 @@
-"""Multi-start search for the placement and component with the largest smallest margin; it can be interrupted."""
+"""Multi-start search for the placement and component whose smallest margin is largest; it can be interrupted."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Solver(Protocol):
     def raise_margin(
         self, start: Candidate, enough: float = np.inf, others: Sequence[Candidate] | None = None
     ) -> Candidate:
-        """Return a candidate near `start` with the largest smallest margin, or with `enough`; never a worse one.
+        """Return a candidate near `start` whose smallest margin is largest, or with `enough`; never a worse one.
 
         others: candidates found before, with which it is compared; it may end early then.
         """

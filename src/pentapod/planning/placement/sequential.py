@@ -74,7 +74,7 @@ class SequentialSolver:
     def raise_margin(
         self, start: Candidate, enough: float = np.inf, others: Sequence[Candidate] | None = None
     ) -> Candidate:
-        """Return a candidate with the largest smallest margin near `start`, or with `enough`; never a worse one.
+        """Return a candidate whose smallest margin is largest near `start`, or with `enough`; never a worse one.
 
         others: candidates with which it is compared. Steps then end where they lead to less, or to one of them, and
         near the optimum.

@@ -31,6 +31,11 @@ class PlacementConstraints(Value):
     largest_turn: the rotation from which the part may be turned by that angle at most, radians; π bounds nothing.
     upright: the unit direction (3,) of the workpiece that must point to `normal` (3,), machine frame; zero where none
     must. poses: the placements to choose from; empty where the origin and the rotation are to be found.
+
+    >>> anywhere = PlacementConstraints.free()
+    >>> as_clamped = PlacementConstraints.fixture([here])
+    >>> anywhere.moves, as_clamped.moves
+    (True, False)
     """
 
     motion: Floats

@@ -24,6 +24,8 @@ class Weights(Value):
     A margin's excess over the needed one is divided by its weight: with strokes = 2 and all else 1 the strokes keep
     twice the excess of the others. Whether a part fits does not depend on the weights. Raises ArrayError for a weight
     that is not positive.
+
+    >>> weights = Weights(strokes=2.0)
     """
 
     strokes: float = 1.0

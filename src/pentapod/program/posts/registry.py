@@ -29,6 +29,8 @@ class PostInput(Value):
     """What a post writes. machine: for which the program was made. toolpath: as placed, machine frame.
 
     sha256: of the file from which the program was read; None where it is what `write_csv` writes.
+
+    >>> given = PostInput(program, machine)
     """
 
     program: Program
@@ -84,7 +86,11 @@ def register(post: Post) -> Post:
 
 
 def post_names() -> list[str]:
-    """Return the names of all posts, those of other packages last."""
+    """Return the names of all posts, those of other packages last.
+
+    >>> "linuxcnc" in post_names()
+    True
+    """
     return list(POSTS)
 
 
@@ -102,6 +108,10 @@ def write_post(
     file says so in its first line (scripts, and G-code after "%", in their second). Nothing is written unless all
     contents could be made. Raises InputError: no passed verdict on this program, an unknown post, one that cannot
     be marked as unverified, a machine or toolpath that is missing, a folder that cannot be written.
+
+    >>> files = write_post(PostInput(program, machine), "pvt", "pvt", unverified=True)
+    >>> [file.name for file in files]
+    ['program.pvt.csv']
     """
     post = find_post(name)
     if not unverified:
@@ -134,6 +144,10 @@ def read_post(folder: str | Path, name: str, machine: Machine | None = None) -> 
     """Return what a post's folder holds. machine: whose leg model made commands of readings, where it has one.
 
     Raises InputError with file and line; where the commands were made by another leg model.
+
+    >>> files = write_post(PostInput(program, machine), "npz", "npz", unverified=True)
+    >>> read_post("npz", "npz").legs.shape == program.legs.shape
+    True
     """
     found = find_post(name).read(Path(folder))
     return found if machine is None or not isinstance(found, Program) else read_back(found, machine)

@@ -31,8 +31,8 @@ from pentapod.timing.jerk.tightening import tightened
 from pentapod.timing.time_law.motion_law import SpeedNodes
 from pentapod.timing.topp.stages import Failure
 
-NO_LAW = Failure(-1, "no law below the fastest one keeps the jerk limits")
-NO_AGREEMENT = Failure(-1, "the blocks of a long path do not agree on a law that keeps the jerk limits")
+NO_LAW = Failure(-1, "no time law keeps the jerk limits")
+NO_AGREEMENT = Failure(-1, "the blocks of a long path do not agree on a time law that keeps the jerk limits")
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,10 @@ def override(
 
     Returns a Refusal where the rest cannot be timed. Raises InputError: a share out of range, a negative time, or a
     time after the end of the path.
+
+    >>> slower = override(trajectory, machine, time=2.0, share=0.5).unwrap()
+    >>> slower.duration > trajectory.duration
+    True
     """
     if not (share == 0.0 or LEAST_SHARE <= share <= LARGEST_SHARE):
         expected = f"0 (hold), or {LEAST_SHARE:g} to {LARGEST_SHARE:g}"

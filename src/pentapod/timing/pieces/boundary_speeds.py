@@ -43,7 +43,7 @@ def law_between(
 
     goal = whole_periods(law(0.0).duration * slower, period)
     if law(LARGEST_REDUCTION).duration < goal * (1.0 - 1e-12):
-        return Failure(-1, "no whole periods are filled without leaving the speeds that are given at the ends")
+        return Failure(-1, "no whole number of periods fits the speeds that are given at the ends")
     less = cast("float", brentq(lambda less: law(less).duration - goal, 0.0, LARGEST_REDUCTION, xtol=1e-15))
     return law(less).stretched(goal)
 

@@ -82,7 +82,8 @@ class PieceProfile:
         at_rest = np.abs(rows.offset).max(axis=1)
         if (at_rest >= 1.0).any():
             k = int(at_rest.argmax())
-            return Failure(k, f"{STANDS_BEYOND}: {at_rest[k]:.3g} times of it", (int(np.abs(rows.offset[k]).argmax()),))
+            reason = f"{STANDS_BEYOND}: {at_rest[k]:.3g} times the limit"
+            return Failure(k, reason, (int(np.abs(rows.offset[k]).argmax()),))
         ends = {"x_start": self.x_start, "x_end": self.x_end}
         return fastest(s, rows.first, rows.second, ceiling, offset=rows.offset, **ends, engine=self.engine)
 

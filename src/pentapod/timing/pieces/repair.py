@@ -50,7 +50,7 @@ class RepairOptions:
 DEFAULTS = RepairOptions()
 
 _EVERYWHERE = "the sampled program exceeds a limit however slowly it is run"
-_SLOW = "the sampled program keeps the limits only if it runs {:.3g} times slower than its first law"
+_SLOW = "the sampled program keeps the limits only if it runs {:.3g} times slower than the first time law"
 
 
 @dataclass(frozen=True)

@@ -57,6 +57,9 @@ class Trajectory(Result):
     controller periods long, so that exact stops fall on setpoints. dwells (L + 1,): seconds of standing before each law
     and after the last, whole periods too. slowed: pieces that last more than 1.02 times as long as their first
     jerk-limited law. limits: those added to the machine's.
+
+    >>> trajectory(trajectory.duration / 2).shape  # the legs at a time
+    (1, 5)
     """
 
     summary = ("duration",)

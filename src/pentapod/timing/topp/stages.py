@@ -9,12 +9,12 @@ import numpy as np
 from pentapod.base.arrays import Floats, as_floats
 from pentapod.base.errors import InputError
 
-NOT_CONTROLLABLE = "from here no law reaches the end (not controllable)"
-UNBOUNDED = "nothing bounds the speed here"
+NOT_CONTROLLABLE = "no time law reaches the end from here (not controllable)"
+UNBOUNDED = "no limit bounds the speed here"
 TOO_FAST_END = "the speed at the end is above a limit"
-TOO_FAST = "the start is faster than any speed from which the end can be reached"
-STANDS_BEYOND = "standing still there would exceed a limit"
-TOO_SLOW = "the start is slower than every speed from which the end can be reached"
+TOO_FAST = "the speed at the start is higher than any from which the end can be reached"
+STANDS_BEYOND = "a limit is exceeded even at rest there"
+TOO_SLOW = "the speed at the start is lower than any from which the end can be reached"
 
 
 @dataclass(frozen=True)

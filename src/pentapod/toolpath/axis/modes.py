@@ -23,7 +23,10 @@ class AxisMode(Protocol):
 
 @dataclass(frozen=True)
 class Normal(Value):
-    """Along the surface normal."""
+    """Along the surface normal.
+
+    >>> along = Orientation(mode=Normal(), smoothing=0.0)
+    """
 
     def axes(self, contacts: Floats, normals: Floats) -> Floats:
         """Return the normals."""
@@ -33,7 +36,10 @@ class Normal(Value):
 
 @dataclass(frozen=True, eq=False)
 class Fixed(Value):
-    """A fixed direction. direction (3,): any length."""
+    """A fixed direction. direction (3,): any length.
+
+    >>> upright = Orientation(mode=Fixed((0.0, 0.0, 1.0)))
+    """
 
     direction: Floats | tuple[float, float, float]
 
@@ -52,6 +58,8 @@ class Pointed(Value):
 
     point, along (3,): metres, workpiece frame. toward: the tip points there, as on the outside of a tube; otherwise it
     points away from there, as on the inside of a tube.
+
+    >>> inward = Orientation(mode=Pointed((0.0, 0.0, -0.2), toward=False))
     """
 
     point: Floats | tuple[float, float, float]
@@ -81,7 +89,11 @@ class Pointed(Value):
 
 @dataclass(frozen=True, eq=False)
 class Between(Value):
-    """Interpolated between directions given at places (K, 3), metres: inverse distance weighting (Shepard 1968)."""
+    """Interpolated between directions given at places (K, 3), metres: inverse distance weighting (Shepard 1968).
+
+    >>> places = np.array([[-0.03, 0.0, 0.0], [0.03, 0.0, 0.0]])
+    >>> turning = Between(places, np.array([[-0.1, 0.0, 1.0], [0.1, 0.0, 1.0]]))
+    """
 
     places: Floats
     directions: Floats

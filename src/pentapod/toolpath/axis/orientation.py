@@ -30,6 +30,9 @@ class Orientation(Value):
 
     smoothing: 0 for none, None where the noise of the axes decides (`noise_tolerance`). reach: None for REACH_M. rate:
     radians per metre, None for no limit. Raises ToolpathError for values out of range.
+
+    >>> leaning = Orientation(mode=Fixed((0.0, 0.0, 1.0)), lead=np.radians(5))
+    >>> toolpath = oriented(toolpath, tool, leaning)
     """
 
     mode: AxisMode = field(default_factory=Normal)
@@ -90,6 +93,10 @@ def oriented(toolpath: Toolpath, tool: Tool, orientation: Orientation) -> Toolpa
     rest at both ends; before the first cut and after the last it is constant. The tilt centre keeps its way there if
     the tool can tilt about it: a ball that is clear stays clear. Other tips move with the ends. Raises ToolpathError as
     `Orientation.axes`.
+
+    >>> upright = oriented(toolpath, tool, Orientation(mode=Fixed((0.0, 0.0, 1.0))))
+    >>> upright.axes[0].tolist()
+    [0.0, 0.0, 1.0]
     """
     cuts = [k for k, segment in enumerate(toolpath.segments) if segment.kind is SegmentKind.CUT]
     if not cuts:

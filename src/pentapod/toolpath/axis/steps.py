@@ -15,6 +15,10 @@ def stepped(toolpath: Toolpath, axis_step: float) -> Toolpath:
 
     Inserted waypoints divide the turn evenly; the tilt centre (a ball's centre, the spot of a beam) moves straight from
     one waypoint to the next. A toolpath that keeps the step is returned unchanged.
+
+    >>> fine = stepped(toolpath, np.radians(1.0))
+    >>> len(fine) >= len(toolpath)
+    True
     """
     segments = tuple(_subdivided(segment, toolpath.tilt_centre, axis_step) for segment in toolpath.segments)
     same = all(new is old for new, old in zip(segments, toolpath.segments, strict=True))

@@ -90,6 +90,10 @@ def read_toolpath(
     of this tool only; unit: "mm" or "inch", of a file that does not name it. Raises ToolpathError with file, line and
     word for anything that is not understood; `others` holds what else is wrong in the file. What was left out, such as
     moves to the home position, is in `notes`.
+
+    >>> _ = write_toolpath(toolpath, "path.csv")
+    >>> len(read_toolpath("path.csv")) == len(toolpath)
+    True
     """
     file = Path(path)
     form = format_of(file, format_name)
@@ -106,6 +110,9 @@ def write_toolpath(toolpath: Toolpath, path: str | Path, format_name: str | None
 
     Equal toolpaths give equal bytes; an interruption leaves no partial file. Raises ToolpathError for an unknown
     format, InputError where the file cannot be written.
+
+    >>> write_toolpath(toolpath, "path.apt").name
+    'path.apt'
     """
     file = Path(path)
     content = format_of(file, format_name).write(toolpath)

@@ -64,6 +64,8 @@ class RotaryAxes(Value):
     metres, from the tip to the point where the axes of the head meet. Both are needed only for moves without tool
     centre point programming while a rotary axis is turned; None where they are not given. Raises ToolpathError for an
     axis that is there twice, and for a table behind a head.
+
+    >>> axes = RotaryAxes.of(["table C", "table A"], centre=(0.0, 0.0, -0.055))
     """
 
     axes: tuple[RotaryAxis, ...]

@@ -33,6 +33,10 @@ def without_gouges(
     along the axis, over the dropped motions and down again, as low as is clear. Finally every motion of the result is
     checked: gouges that remain, and links and rapids that collide with the part, are reported. Raises ToolpathError for
     lengths of the options that are much larger than the part.
+
+    >>> clean, report = without_gouges(toolpath, tool, part, GougeOptions(remedies=(Remedy.DROP,)))
+    >>> report.left
+    0
     """
     check_size(options, float(np.ptp(part.bounds, axis=0).max()), ToolpathError)
     cut = np.array([toolpath.segments[k].kind is SegmentKind.CUT for k in toolpath.segment_of_interval])

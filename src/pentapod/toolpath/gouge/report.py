@@ -20,7 +20,11 @@ MOST_NAMED = 6
 
 
 class Remedy(StrEnum):
-    """What is done about a gouge: tilt the tool within a cone, lift it along its axis, drop the cut, or only report."""
+    """What is done about a gouge: tilt the tool within a cone, lift it along its axis, drop the cut, or only report.
+
+    >>> [remedy.value for remedy in Remedy]
+    ['tilt', 'lift', 'drop', 'report']
+    """
 
     TILT = "tilt"
     LIFT = "lift"
@@ -51,6 +55,8 @@ class GougeOptions(Value):
 
     links: style of new links where old ones collide with the part; None: they stay, and are reported. search, ways: see
     `RemedySearch`, `WayOutSearch`. Raises ToolpathError for values out of range.
+
+    >>> remedies = GougeOptions(remedies=(Remedy.LIFT, Remedy.DROP))
     """
 
     remedies: tuple[Remedy, ...] = (Remedy.REPORT,)

@@ -18,6 +18,9 @@ def read_lines(path: str | Path, tolerance: float) -> list[Floats]:
     """Return the polylines (n, 2), metres, y up, of an .svg or .dxf file; chords deviate from curves by `tolerance`.
 
     Raises ToolpathError with the file: missing, of another kind, without a line or a unit.
+
+    >>> len(read_lines("line.svg", tolerance=1e-5))
+    1
     """
     path = Path(path)
     readers: dict[str, Callable[[Path, bytes, float], list[Floats]]] = {".svg": svg_lines, ".dxf": dxf_lines}

@@ -34,6 +34,10 @@ def lettering(text: str, height: float, *, spacing: float = 1.0, align: str = "c
 
     Line feeds separate lines; the origin is the middle of the text block. spacing: factor on the characters' widths.
     align: left, centre or right. Raises ToolpathError for no text, and for a character that the font does not have.
+
+    >>> strokes = lettering("H", height=0.01)
+    >>> len(strokes)
+    3
     """
     if not text.strip():
         raise ToolpathError("there is no text", key="text", value=text)

@@ -20,6 +20,9 @@ def read_darkness(path: str | Path) -> Floats:
     """Return the darkness (rows, columns), 0 for white to 1 for black, of a picture; transparent pixels are white.
 
     Raises ToolpathError with the file: not a picture, or too many pixels.
+
+    >>> read_darkness("dot.pgm").tolist()  # one black point
+    [[1.0]]
     """
     path = Path(path)
     pillow = extra("PIL.Image", "pillow", path)

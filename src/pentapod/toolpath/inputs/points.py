@@ -25,6 +25,9 @@ def read_points(path: str | Path) -> list[Floats]:
     The first row names the columns with their unit: x_mm, y_mm, z_mm (or cm, m, inch), and optionally `line`. A new
     polyline begins where the value of `line` changes, and after an empty row. Lines that begin with # are remarks; with
     "# points = 120" a file of another number of rows is refused. Raises ToolpathError with file and line.
+
+    >>> [line.shape for line in read_points("line.csv")]  # x_mm,y_mm,z_mm
+    [(2, 3)]
     """
     path = Path(path)
     columns: dict[str, tuple[int, float]] | None = None

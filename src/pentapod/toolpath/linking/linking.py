@@ -75,8 +75,8 @@ class Linker:
     """Links between passes in their order of work.
 
     A pass that begins where the previous one ends follows without a link; one within `stay` is reached over the
-    surface if the limits of the surface allow; one within `hop` by a rapid just above the part; others by way of
-    the clearance level. `toolpath` counts how many passes are reached on the surface (stay_downs) and by a hop (hops).
+    surface if the limits of the surface allow; one within `hop` by a rapid just above the part; others at
+    the clearance height. `toolpath` counts how many passes are reached on the surface (stay_downs) and by a hop (hops).
     """
 
     def __init__(

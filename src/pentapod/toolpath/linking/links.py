@@ -33,6 +33,8 @@ class LinkStyle(Value):
     of rapids, radians. rapid_spacing: largest distance between them, metres. blend: largest length of each leg that the
     arc at a corner takes, metres. arc_step: turn between points of arcs, radians. same_corner: corners nearer than this
     are one, metres.
+
+    >>> style = LinkStyle(view=np.array([0.0, 0.0, 1.0]), level=0.05, approach=3e-3, spacing=2e-3, feed=0.05)
     """
 
     view: Floats
@@ -77,7 +79,7 @@ def retract(tips: Floats, axes: Floats, style: LinkStyle, leave: Floats | None =
 
 
 def rapid(start: Pose | None, end: Pose | None, style: LinkStyle) -> Segment:
-    """Return the rapid from the end of a retract to the start of an approach, by way of the clearance level.
+    """Return the rapid from the end of a retract to the start of an approach, at the clearance height.
 
     Without a start it comes from that level, without an end it stays there; one of them is given.
     """
@@ -118,7 +120,7 @@ def rise(tip: Floats, leave: Floats, style: LinkStyle) -> Floats:
 def turning(start: Floats, end: Floats, t: Floats, view: Floats) -> Floats:
     """Return axes (N, 3) along the great circle from one axis to the other at shares t (N,), at rest at both ends.
 
-    Opposite axes are joined by way of the view (3,).
+    Opposite axes are joined through the view (3,).
     """
     t = eased(t)
     angle = float(angle_between(start, end))

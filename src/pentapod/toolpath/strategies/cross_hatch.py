@@ -17,7 +17,10 @@ from pentapod.toolpath.surface import Surface
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CrossHatchOptions(RasterOptions):
-    """Parallel plane slices, and others across them."""
+    """Parallel plane slices, and others across them.
+
+    >>> hatch = CrossHatchOptions(stepover=15e-3)
+    """
 
     angle: Annotated[float, Key("deg", "angle from the first passes to the second", ge=-360.0, le=360.0)] = float(
         np.radians(90.0)

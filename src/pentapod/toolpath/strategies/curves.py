@@ -37,6 +37,8 @@ class CurveOptions(PathOptions):
     lines: each (n, 2), metres, x to the right and y up as seen against the view. laying: see `Laying`. position (3,):
     on the surface or over it, seen along the view. scale: of the lines. in_order: whether the lines are cut in the
     given order.
+
+    >>> lines = CurveOptions(lines=lettering("A", 0.01), depth=2e-4)
     """
 
     lines: Sequence[Floats] = ()

@@ -23,6 +23,10 @@ class DrawingOptions(CurveOptions):
 
     file: SVG or DXF; curves in it become chords within a quarter of `chordal`. Raises ToolpathError where it cannot be
     read.
+
+    >>> drawing = DrawingOptions(file="line.svg", scale=0.5, depth=1e-4)
+    >>> len(drawing.lines)
+    1
     """
 
     lines: Sequence[Floats] = field(init=False, default=())

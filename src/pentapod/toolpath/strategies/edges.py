@@ -46,7 +46,10 @@ class Which(StrEnum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EdgeOptions(PathOptions):
-    """Borders and sharp edges, for deburring."""
+    """Borders and sharp edges, for deburring.
+
+    >>> edges = EdgeOptions(clearance=15e-3)
+    """
 
     which: Annotated[Which | str, Key("", "which edges are followed")] = Which.BOTH
     sharpest: Annotated[float, Key("deg", "angle of the normals from which an edge is sharp", gt=0.0, lt=180.0)] = (

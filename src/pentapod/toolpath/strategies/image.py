@@ -35,6 +35,8 @@ class ImageOptions(PathOptions):
 
     darkness (rows, columns): from 0, white, to 1, black; the first row is the top one; pixels are square. effect: see
     `Effect`. laying, rotation: as for curves.
+
+    >>> picture = ImageOptions(darkness=np.eye(8), width=0.03)
     """
 
     darkness: Annotated[

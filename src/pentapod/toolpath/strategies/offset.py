@@ -31,6 +31,8 @@ class OffsetOptions(CoverOptions):
     """Lines at a constant geodesic distance from each other.
 
     curve (n, 3): metres, workpiece frame, on the surface or near it; the region's border when None.
+
+    >>> rings = OffsetOptions(stepover=10e-3)
     """
 
     curve: Annotated[

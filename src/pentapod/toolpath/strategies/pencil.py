@@ -15,7 +15,10 @@ from pentapod.toolpath.surface import Surface
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PencilOptions(PathOptions):
-    """Lines along the creases of a ball's drive surface. sharpest: angle between the directions to both contacts."""
+    """Lines along the creases of a ball's drive surface. sharpest: angle between the directions to both contacts.
+
+    >>> corners = PencilOptions(clearance=15e-3)
+    """
 
     sharpest: Annotated[
         float, Key("deg", "angle between the sides of a corner from which it counts", gt=0.0, lt=180.0)

@@ -30,7 +30,10 @@ class Towards(StrEnum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PolylineOptions(PathOptions):
-    """Lines given point by point. lines: each (n, 3), metres, workpiece frame. towards: see `Towards`."""
+    """Lines given point by point. lines: each (n, 3), metres, workpiece frame. towards: see `Towards`.
+
+    >>> line = PolylineOptions(lines=[np.array([[-0.02, 0.0, 0.05], [0.02, 0.0, 0.05]])])
+    """
 
     lines: Annotated[
         Sequence[Floats],

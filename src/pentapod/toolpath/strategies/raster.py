@@ -49,6 +49,10 @@ class RasterOptions(CoverOptions):
     other views see `geometry.tangent_frame`. pattern: see `Pattern`. steep: areas whose normals are farther from the
     view, radians, are cut in waterlines in place of the passes, which lie beside each other or leave gaps there; None
     for none.
+
+    >>> passes = RasterOptions(stepover=15e-3, direction=np.radians(45))
+    >>> len(make_toolpath(part, tool, passes)) > 50
+    True
     """
 
     direction: Annotated[float, Key("deg", "direction of the passes, from +x towards +y", ge=-360.0, le=360.0)] = 0.0

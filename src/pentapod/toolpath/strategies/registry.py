@@ -75,6 +75,10 @@ def toolpath_with_report(
 
     Raises ToolpathError if nothing is left to machine, if the options do not suit part or tool, or if a length is much
     larger than the part, as one in millimetres would be.
+
+    >>> toolpath, report = toolpath_with_report(part, tool, RasterOptions(stepover=15e-3))
+    >>> print(str(report).partition(",")[0])
+    raster: 5 passes
     """
     strategy = strategy_of(options)
     check_size(options, float(np.ptp(mesh.bounds, axis=0).max()), ToolpathError)
@@ -123,5 +127,10 @@ def with_fills(surface: Surface, paths: ContactPaths, options: PathOptions) -> C
 
 
 def make_toolpath(mesh: Mesh, tool: Tool, options: PathOptions, axis: Floats | None = None) -> Toolpath:
-    """Return the toolpath of `toolpath_with_report`."""
+    """Return the toolpath of `toolpath_with_report`.
+
+    >>> toolpath = make_toolpath(part, BallCutter(3e-3), RasterOptions(stepover=15e-3))
+    >>> toolpath.segments[0].kind.name
+    'RAPID'
+    """
     return toolpath_with_report(mesh, tool, options, axis)[0]

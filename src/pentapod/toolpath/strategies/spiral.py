@@ -40,6 +40,8 @@ class SpiralOptions(CoverOptions):
 
     form: see `Form`. centre (3,): metres, workpiece frame, seen along the view; None: the point that is furthest from
     the border (offset), or the middle of the region (planar).
+
+    >>> spiral = SpiralOptions(stepover=10e-3)
     """
 
     form: Annotated[Form | str, Key("", "following the border, or round as seen from above")] = Form.OFFSET

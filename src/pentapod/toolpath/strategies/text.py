@@ -24,7 +24,10 @@ class Align(StrEnum):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TextOptions(CurveOptions):
-    """Text, in single strokes. Raises ToolpathError for a character that the font does not have."""
+    """Text, in single strokes. Raises ToolpathError for a character that the font does not have.
+
+    >>> text = TextOptions(text="PENTAPOD", height=8e-3, depth=1e-4)
+    """
 
     lines: Sequence[Floats] = field(init=False, default=())
     text: Annotated[str, Key("", "the text; \\n begins a new line")]

@@ -22,6 +22,8 @@ class WaterlineOptions(CoverOptions):
 
     upright (3,): direction of the heights; the view when None. shallowest: surface that is flatter, seen along
     `upright`, is left out, because lines of constant height would be far apart there.
+
+    >>> steep = WaterlineOptions(stepover=2e-3)
     """
 
     upright: Annotated[

@@ -40,6 +40,8 @@ class Coverage(Value):
     region, where a program may be a piece of it. leans: largest angle of the tool from the view, radians, up to which
     it is told what the program leaves although a tool that leans might reach it; 0 tells nothing. Raises ArrayError
     unless `left` is positive and `share` from 0 to 1.
+
+    >>> coverage = Coverage.of(part, tool, RasterOptions(stepover=15e-3), path_tolerance=20e-6)
     """
 
     region: Patch | None

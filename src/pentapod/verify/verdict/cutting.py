@@ -22,6 +22,8 @@ class Cutting(Value):
     surface: of the finished part, workpiece frame. solids: of the tool; those of kind "cutter" cut. depth: metres by
     which cuts and links may go into the part: the gouge tolerance and the engraving depth. coverage: what must be
     machined; None where it is not given. Raises ArrayError where depth is negative.
+
+    >>> cutting = Cutting.of(part, tool)
     """
 
     surface: MeshDistance

@@ -53,6 +53,10 @@ class Certificate(Value):
     unit: as in files, mm, deg, mm/s, …. method: how the value was computed, and what it covers (at the rows or between
     them, proven or sampled). allowed: largest value that passes although it is beyond its bound, for the reason in
     `method`; None where there is no such tolerance.
+
+    >>> claim = verdict.certificates[0]
+    >>> claim.claim, claim.passed
+    ('machine', True)
     """
 
     summary = ("claim", "passed")
@@ -76,7 +80,11 @@ class Certificate(Value):
 
 @dataclass(frozen=True)
 class NotJudged(Value):
-    """A claim that the job needs but that could not be judged, and why. waived: the job does not ask for it."""
+    """A claim that the job needs but that could not be judged, and why. waived: the job does not ask for it.
+
+    >>> verdict.not_judged[0].waived
+    False
+    """
 
     summary = ("claim", "waived")
 
@@ -87,7 +95,11 @@ class NotJudged(Value):
 
 @dataclass(frozen=True)
 class Verdict(Result):
-    """All certificates of a program, the claims that were not judged, and the files that it is about."""
+    """All certificates of a program, the claims that were not judged, and the files that it is about.
+
+    >>> [claim.claim for claim in verdict.certificates if not claim.passed]
+    []
+    """
 
     summary = ("answer",)
 
