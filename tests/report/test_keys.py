@@ -72,7 +72,7 @@ def test_the_page_puts_the_joints_of_every_family_where_they_are(name):
     tips = machine.work.centre + 0.02 * random.standard_normal((20, 3))
     axes = np.array([0.0, 0.0, -1.0]) + 0.1 * random.standard_normal((20, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    beside = joints_beside(machine, tips, axes)
+    beside = joints_beside(machine, tips[0], axes[0])
     data = machine_data(machine, (), beside)
     ends = leg_ends(machine, tips, axes)[1]
     assert len(data["legs"]) == machine.robot.n_legs

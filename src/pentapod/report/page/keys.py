@@ -65,7 +65,7 @@ class Keys:
     def of(cls, signals: Signals, machine: Machine, placed: PlacedPath, tolerance: float) -> Keys:
         """Return the keys of a program. tolerance: of the program against the path, metres."""
         tips, axes = signals.tips, signals.axes
-        beside = joints_beside(machine, tips, axes)
+        beside = joints_beside(machine, tips[0], axes[0])
         joints = leg_ends(machine, tips, axes)[1][:, beside] if len(beside) else np.zeros((len(tips), 0, 3))
         far = 1e3 * (machine.tool_length - machine.line_top)
         shown = np.concatenate([1e3 * tips, far * axes, 1e3 * joints.reshape(len(tips), -1)], axis=1)
@@ -125,12 +125,11 @@ def _scale(name: str, array: str, unit: str, worst: float, best: float, ends: tu
     return {"name": name, "array": array, "unit": unit, "worst": worst, "best": best, "ends": ends}
 
 
-def joints_beside(machine: Machine, tips: Floats, axes: Floats) -> Ints:
-    """Return which legs (B,) end beside the tool axis in some of the poses (N, 3)."""
+def joints_beside(machine: Machine, tip: Floats, axis: Floats) -> Ints:
+    """Return which legs (B,) end beside the tool axis; tip, axis (3,): of any pose, since the platform is rigid."""
     heights = machine.tool_length - machine.robot.offsets
-    feet = tips[:, None] + heights[:, None] * axes[:, None]
-    far = np.linalg.norm(leg_ends(machine, tips, axes)[1] - feet, axis=-1)
-    return np.flatnonzero(far.max(axis=0) > OPTIONS.on_axis_m)
+    far = np.linalg.norm(leg_ends(machine, tip, axis)[1] - (tip + heights[:, None] * axis), axis=-1)
+    return np.flatnonzero(far > OPTIONS.on_axis_m)
 
 
 def straight_rows(times: Floats, points: Floats, must: Bools, most: float) -> Ints:

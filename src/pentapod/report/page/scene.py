@@ -64,7 +64,7 @@ def scene_of(packed: Packed, outcome: Outcome, signals: Signals | None, machine:
     if placed is not None:
         beside = np.zeros(0, dtype=np.intp)
         if signals is not None:
-            beside = joints_beside(machine, signals.tips, signals.axes)
+            beside = joints_beside(machine, signals.tips[0], signals.axes[0])
         elif placed.placement.rail_positions is not None:
             machine = machine.at(placed.placement.rail_positions)
         if (held := held_mesh(outcome, placed)) is not None:
@@ -74,7 +74,7 @@ def scene_of(packed: Packed, outcome: Outcome, signals: Signals | None, machine:
         if signals is None:
             worst = int(placed.margins.min(axis=1).argmin())
             tip, axis = placed.tips[worst], placed.axes[worst]
-            beside = joints_beside(machine, tip[None], axis[None])
+            beside = joints_beside(machine, tip, axis)
             joints = 1e3 * leg_ends(machine, tip, axis)[1][beside]
             scene["pose"] = {"tip": (1e3 * tip).tolist(), "axis": axis.tolist(), "joints": joints.ravel().tolist()}
         scene["machine"] = machine_data(machine, job_tool(outcome.job, machine).solids, beside)
