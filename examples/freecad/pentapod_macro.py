@@ -32,6 +32,7 @@ MARGIN_MM = 0.1  # of the region's box about the selected faces
 MARGIN_DEG = 1.0  # of the region's angle about their normals
 MOST_POINTS = 20_000  # of the path that is shown; the program has a row for each setpoint
 AXES, AXIS_MM = 200, 15.0  # tool axes that are drawn, and their length
+AXIS_COLOUR = (0.95, 0.6, 0.2)
 RAPID = 1.2  # what is faster than the job's feed by this factor is shown as a rapid
 SHAPES = {"ballend": "ball", "endmill": "flat", "bullnose": "bull"}
 
@@ -109,10 +110,10 @@ def show(out, job, document):
     times, tips, axes = table[:, 0], table[:, 1:4], table[:, 4:7]
     kept = np.unique(np.append(np.arange(0, len(table), -(-len(table) // MOST_POINTS)), len(table) - 1))
     lengths = np.linalg.norm(np.diff(tips[kept], axis=0), axis=1)
-    speeds = np.append(0.0, lengths / np.diff(times[kept]))
+    speeds = np.append(np.inf, lengths / np.diff(times[kept]))  # to the first point it is brought, as by a rapid
     cut = float(re.search(r"^\s*cut_mm_min\s*=\s*([0-9.]+)", job.read_text(encoding="utf-8"), re.M)[1]) / 60.0
     commands = [
-        Cam.Command("G0" if speed > RAPID * cut else "G1", {"X": x, "Y": y, "Z": z, "F": speed})
+        Cam.Command("G0" if speed > RAPID * cut else "G1", _words(x, y, z, speed))
         for (x, y, z), speed in zip(tips[kept].tolist(), speeds.tolist(), strict=True)
     ]
     group = document.getObject("Pentapod") or document.addObject("App::DocumentObjectGroup", "Pentapod")
@@ -125,10 +126,21 @@ def show(out, job, document):
     ends = np.stack([tips[where], tips[where] + AXIS_MM * axes[where]], axis=1).tolist()
     drawn.Shape = Part.makeCompound([Part.makeLine(tuple(low), tuple(high)) for low, high in ends])
     group.addObjects([path, drawn])
+    if App.GuiUp:
+        path.ViewObject.StartPosition = App.Vector(*tips[0].tolist())  # not the origin
+        path.ViewObject.LineWidth, drawn.ViewObject.LineWidth = 2, 1
+        drawn.ViewObject.LineColor = drawn.ViewObject.PointColor = AXIS_COLOUR
+        drawn.ViewObject.PointSize = 1
     passed = json.loads((out / "verdict.json").read_text(encoding="utf-8"))["passed"]
     group.Label = f"pentapod: {times[-1]:.1f} s, verdict {'passed' if passed else 'NOT passed'}"
     document.recompute()
     return group
+
+
+def _words(x, y, z, speed):
+    """Return the words of a move: millimetres, and mm/s where the speed is finite."""
+    words = {"X": x, "Y": y, "Z": z}
+    return {**words, "F": speed} if math.isfinite(speed) else words
 
 
 def run(*words, said=None):
@@ -271,5 +283,5 @@ def main():
         QtGui.QMessageBox.warning(None, "pentapod", str(error))
 
 
-if App.GuiUp and App.ActiveDocument is not None:
+if __name__ == "__main__":  # so FreeCAD runs macros
     main()

@@ -1,10 +1,12 @@
 """What a user does in FreeCAD, run by freecadcmd: a solid with a round top, a tool, the macro; results as JSON.
 
-The environment names the folder (FOLDER), the macro (MACRO) and how far to go (UNTIL: job or path).
+The environment names the folder (FOLDER), the macro (MACRO) and how far to go: UNTIL is job, path, or window, which
+needs FreeCAD with its window.
 """
 
 import json
 import os
+import runpy
 import sys
 from pathlib import Path as File
 
@@ -29,15 +31,36 @@ BITS = File(App.getResourceDir()) / "Mod" / "Path" / "Tools" / "Bit"
 
 
 def controller(bit, feed_mm_min):
-    found = ToolController.Create("TC", tool=ToolBit.Factory.CreateFrom(str(BITS / bit)), assignViewProvider=False)
+    made = ToolBit.Factory.CreateFrom(str(BITS / bit))
+    found = ToolController.Create("TC", tool=made, assignViewProvider=App.GuiUp)
     found.HorizFeed = feed_mm_min / 60.0
     return found
 
 
 tool = controller("6mm_Ball_End.fctb", 1800.0)
-result = {"job": macro.send(part, [top], tool, folder).read_text()}
-job = folder / "job.toml"
-if until == "job":
+result, job = {}, folder / "job.toml"
+if until == "window":
+    import FreeCADGui as Gui
+
+    document.saveAs(str(folder / "part.FCStd"))
+    macro.send(part, [top], tool, macro.folder_of(document))  # then the user changes the job
+    job = folder / "part_pentapod" / "job.toml"
+    for old, new in json.loads(os.environ["CHANGES"]):
+        job.write_text(job.read_text().replace(old, new))
+    Gui.Selection.addSelection(part, top)
+    Gui.Selection.addSelection(tool)
+    runpy.run_path(os.environ["MACRO"], run_name="__main__")
+    group = document.getObject("Pentapod")
+    result["label"], result["objects"] = group.Label, [o.Name for o in group.Group]
+    result["job"] = job.read_text()
+    view = Gui.activeDocument().activeView()
+    Gui.Selection.clearSelection()
+    tool.Tool.ViewObject.Visibility = False
+    view.viewIsometric()
+    view.fitAll()
+    view.saveImage(str(folder / "window.png"), 1000, 700, "White")
+elif until == "job":
+    result["job"] = macro.send(part, [top], tool, folder).read_text()
     job.write_text(job.read_text().replace("stepover_mm = 1", "stepover_mm = 2.5  # mine"))
     bull = controller("6mm_Bullnose.fctb", 0.0)
     bull.Tool.FlatRadius = 1.0
@@ -50,6 +73,7 @@ if until == "job":
         except macro.MacroError as error:
             result["errors"].append(str(error))
 else:
+    macro.send(part, [top], tool, folder)
     for old, new in json.loads(os.environ["CHANGES"]):
         assert old in job.read_text(), old
         job.write_text(job.read_text().replace(old, new))
@@ -73,3 +97,5 @@ else:
     except macro.MacroError as error:
         result["error"] = str(error)
 (folder / "result.json").write_text(json.dumps(result))
+if App.GuiUp:
+    os._exit(0)  # it would ask whether to save the document

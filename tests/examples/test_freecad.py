@@ -20,7 +20,10 @@ MACRO = HERE.parents[1] / "examples" / "freecad" / "pentapod_macro.py"
 pytestmark = pytest.mark.skipif(shutil.which("freecadcmd") is None, reason="FreeCAD (freecadcmd) is not installed")
 
 
-def session(folder: Path, until: str, changes=()) -> dict:
+WINDOW = ["xvfb-run", "-a", "-s", "-screen 0 1280x900x24", "freecad"]
+
+
+def session(folder: Path, until: str, changes=(), program=("freecadcmd",)) -> dict:
     """Run the session in FreeCAD's own Python, and pentapod in ours; return what it found."""
     command = folder / "pentapod"
     code = "from pentapod.cli.main import main; main()"
@@ -29,9 +32,10 @@ def session(folder: Path, until: str, changes=()) -> dict:
     command.chmod(0o755)
     words = {"FOLDER": folder, "MACRO": MACRO, "UNTIL": until, "CHANGES": json.dumps(changes), "PENTAPOD": command}
     home = {"HOME": folder, "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")}
+    home["QTWEBENGINE_DISABLE_SANDBOX"] = 1  # of FreeCAD's start page; it would not start as root
     environment = {**os.environ, **{name: str(value) for name, value in {**words, **home}.items()}}
     done = subprocess.run(
-        ["freecadcmd", str(HERE / "freecad_session.py")], capture_output=True, text=True, check=False, env=environment,
+        [*program, str(HERE / "freecad_session.py")], capture_output=True, text=True, check=False, env=environment,
         stdin=subprocess.DEVNULL, timeout=500,
     )  # fmt: skip
     assert (folder / "result.json").exists(), (done.stdout + done.stderr)[-3000:]
@@ -87,3 +91,16 @@ def test_program_is_shown_where_it_cuts(changes, tmp_path):
     assert {"G1"} <= set(found["kinds"]) <= {"G0", "G1"}
     assert "cut_mm_mn" in found["error"]
     assert "did you mean" in found["error"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("xvfb-run") is None, reason="xvfb, a display without a screen, is not installed")
+def test_selection_in_the_window_is_sent(tmp_path):
+    """The macro as FreeCAD runs it: the selected face and tool controller, its own folder, the group in the tree."""
+    found = session(tmp_path, "window", [*in_the_middle(), ("stepover_mm = 8", "stepover_mm = 3")], WINDOW)
+    assert found["label"].endswith("verdict passed"), found["label"]
+    assert found["objects"] == ["PentapodPath", "PentapodAxes"]
+    assert "region_box_mm" in found["job"]
+    assert "stepover_mm = 3" in found["job"], "what the user changed stays"
+    assert (tmp_path / "part_pentapod" / "out" / "program.csv").is_file()
+    assert (tmp_path / "window.png").stat().st_size > 10_000
