@@ -41,6 +41,11 @@ class Closed:
             mujoco.mj_integratePos(self.model, self.data.qpos, move, 1.0)
         return float(np.abs(gaps).max())
 
+    def site(self, *names: str) -> np.ndarray:
+        """Where the first site is that the model has, of these."""
+        known = {self.model.site(k).name for k in range(self.model.nsite)}
+        return self.data.site(next(name for name in names if name in known)).xpos
+
     def apart(self, base: np.ndarray, number: int) -> float:
         """How far a base joint (3,) is from the leg's joint on the platform, metres, by the platform's own frame."""
         return float(np.linalg.norm(self.data.site(f"platform{number}").xpos - base))

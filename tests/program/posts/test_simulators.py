@@ -48,6 +48,10 @@ def check_rows(closed: Closed, machine, program, positions, every: int = 50) -> 
         position, direction = robot.pose(program.legs[row], program.component)
         tip = position + machine.tool_length * direction
         assert np.abs(closed.data.site("tip").xpos - tip).max() < 1e-6, row
+        if machine.limb is not None:
+            _, end = machine.limb.ends(position, direction)
+            assert np.abs(closed.site("platform_on_strut", "platformlimb") - end).max() < 1e-6, row
+            assert np.abs(closed.data.body("strut").xpos - end).max() < 1e-6, row
         axis = closed.data.body("platform").xmat[2::3]
         assert np.abs(axis - direction).max() < 1e-6, row
 
