@@ -54,6 +54,7 @@ HEAD = """# Gallery
 Every strategy at work: each picture is the toolpath of a job in `toolpaths/`, and each of these jobs plans and verifies
 as it stands (`pentapod plan toolpaths/NAME.toml -o out/`). Cuts run from blue to yellow in the order of work; links and
 rapids are thin and grey. `python toolpaths/make_gallery.py` draws this page.
+The notebook `examples/gallery.ipynb` goes from a mesh to a checked program, with pictures after every step.
 """
 
 CONCAVE_HEAD = """---

@@ -56,6 +56,8 @@ if TYPE_CHECKING:
     from pentapod.machine.report.report import MachineReport as MachineReport
     from pentapod.machine.report.report import check as check
     from pentapod.machine.report.report import explain as explain
+    from pentapod.machine.rigid_bodies.mjcf import mjcf as mjcf
+    from pentapod.machine.rigid_bodies.sdf import sdf as sdf
     from pentapod.machine.work_volume import sample_work_volume as sample_work_volume
 
 _HOMES = {
@@ -76,6 +78,8 @@ _HOMES = {
     "machine.report.drift": "Drift drift",
     "machine.report.modes": "AssemblyPose AssemblyPoses admissible_modes",
     "machine.report.report": "AMPLIFICATION_LIMIT MachineFinding MachineReport check explain",
+    "machine.rigid_bodies.mjcf": "mjcf",
+    "machine.rigid_bodies.sdf": "sdf",
     "machine.work_volume": "sample_work_volume",
 }
 

@@ -2,7 +2,6 @@
 
 from pentapod.simulate.forces import cutting_forces
 from pentapod.simulate.measures import Measure, Tracking, contour_errors
-from pentapod.simulate.mjcf import mjcf
 from pentapod.simulate.mujoco_engine import Physics, Plant, load_mujoco, plant, simulate_mujoco
 from pentapod.simulate.reference import Played, Reference
 from pentapod.simulate.servo import simulate_servo
@@ -17,7 +16,6 @@ __all__ = [
     "contour_errors",
     "cutting_forces",
     "load_mujoco",
-    "mjcf",
     "plant",
     "simulate_mujoco",
     "simulate_servo",

@@ -18,8 +18,8 @@ from pentapod.kinematics.jacobian import pose_jacobian
 from pentapod.kinematics.legs_on_rings import LegsOnRings
 from pentapod.machine.bars import PassiveLimb
 from pentapod.machine.machine import Machine
+from pentapod.machine.rigid_bodies.capsules import Capsule, leg_cylinder, leg_rod, limb_strut, spindle
 from pentapod.numerics.blocks import blocks
-from pentapod.simulate.bodies import Capsule, leg_cylinder, leg_rod, limb_strut, spindle
 from pentapod.simulate.reference import Reference
 
 

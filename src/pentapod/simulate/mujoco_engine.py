@@ -16,9 +16,10 @@ from pentapod.base.refusal import Refusal, stage
 from pentapod.base.values import Result
 from pentapod.kinematics.families.as_built import AsBuiltPentapod, as_pentapod
 from pentapod.kinematics.robot import Robot
+from pentapod.machine.rigid_bodies.frames import steps_in
+from pentapod.machine.rigid_bodies.mjcf import mjcf
 from pentapod.simulate.forces import leg_loads
 from pentapod.simulate.measures import Measure
-from pentapod.simulate.mjcf import mjcf
 from pentapod.simulate.reference import Played, Reference
 
 
@@ -26,16 +27,10 @@ from pentapod.simulate.reference import Played, Reference
 class PhysicsOptions:
     """Options of the rigid-body simulation."""
 
-    longest_step: float = 5e-4
-    """Step in seconds at most; the controller's period is cut in equal steps."""
     rest: float = 0.3
     """Seconds at rest before the start, until the drives carry the weight."""
     report_rows: int = 500
     """Rows between two reports of progress."""
-
-    def steps(self, period: float) -> int:
-        """Return the steps in a period."""
-        return max(1, int(np.ceil(period / self.longest_step - 1e-9)))
 
 
 DEFAULTS = PhysicsOptions()
@@ -106,8 +101,7 @@ def plant(
     position, direction = real.pose(program.legs[0], program.component)
     if not np.isfinite(position).all():
         return Refusal("simulation", "the machine with these errors has no proven pose at the program's start")
-    step = program.period / DEFAULTS.steps(program.period)
-    return Plant(mjcf(machine, real, position, direction, step=step), position, direction)
+    return Plant(mjcf(machine, real, position, direction, period=program.period), position, direction)
 
 
 @stage
@@ -132,7 +126,7 @@ def _run(
     mujoco: Any, reference: Reference, as_built: Plant, tip_forces: ArrayLike, progress: Progress
 ) -> Physics | Refusal:
     program, machine = reference.program, reference.machine
-    (rows, legs), parts = program.legs.shape, DEFAULTS.steps(program.period)
+    (rows, legs), parts = program.legs.shape, steps_in(program.period)
     model = mujoco.MjModel.from_xml_string(as_built.xml)
     data = mujoco.MjData(model)
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -70,22 +71,45 @@ def ik(pose: tuple[float, ...], machine_name: str, as_json: bool, quiet: bool) -
 @click.argument("legs", nargs=-1, type=Real(), metavar="[L1 L2 ...]")
 @click.option("-c", "--component", help='Its signs: "++", "+-", "-+" or "--"; all of the machine when left out.')
 @click.option("--commands", is_flag=True, help="The numbers are what the drives are told (machines with a leg model).")
+@click.option("--program", type=click.Path(path_type=Path), metavar="FILE",
+              help="Instead of legs: the tool's path of a program, in the frame of the part.")  # fmt: skip
+@click.option("--job", type=click.Path(path_type=Path), help="With --program: its job, which names the machine.")
 @_machine_option
 @json_option
 @quiet_option
+@click.pass_context
 def fk(
-    legs: tuple[float, ...], component: str | None, commands: bool, machine_name: str, as_json: bool, quiet: bool
+    ctx: click.Context,
+    legs: tuple[float, ...],
+    component: str | None,
+    commands: bool,
+    program: Path | None,
+    job: Path | None,
+    machine_name: str,
+    as_json: bool,
+    quiet: bool,
 ) -> int:
     """Forward kinematics: tips in mm, tool axes and distances to singularities of leg lengths in mm.
 
     Five legs have four poses, one in each component, or none. Without numbers, CSV is read from stdin: a
     header "leg1_mm,leg2_mm,...", then one set of legs in each line. nan: no such pose. Exit code 1 where a
     set of legs has no pose.
+
+    With --program FILE: times, tips and axes of its rows, in the frame of the part, as the program's legs put
+    them. The machine is that of the program, as in `pentapod post`.
     """
     import numpy as np
 
     from pentapod.machine import Machine
 
+    if program is not None:
+        if legs or component is not None or commands:
+            raise click.UsageError("--program takes no legs, --component and --commands", ctx)
+        default = ctx.get_parameter_source("machine_name") is click.core.ParameterSource.DEFAULT
+        _print(_tool_path(program, job, None if default else machine_name), as_json=as_json, one=False, quiet=quiet)
+        return 0
+    if job is not None:
+        raise click.UsageError("--job needs --program", ctx)
     machine = Machine.load(machine_name)
     robot = machine.robot
     rows = _rows(legs, leg_names(robot)) * 1e-3
@@ -103,6 +127,21 @@ def fk(
     columns |= _distances(robot, position, direction)
     _print(columns, as_json=as_json, one=bool(legs) and component is not None, quiet=quiet)
     return 0 if np.isfinite(tips).all() else 1
+
+
+def _tool_path(file: Path, job: Path | None, machine_name: str | None) -> dict[str, Any]:
+    """Return times, tips and axes (from the tip to the spindle) of a program's rows in the frame of the part."""
+    from pentapod.cli.commands.post import program_machine
+    from pentapod.program import read_csv
+    from pentapod.program.posts import PostInput
+
+    program = read_csv(file)
+    machine = PostInput(program, program_machine(program, file.parent, job, machine_name)).the_machine()
+    position, direction = machine.robot.pose(program.legs, program.component)
+    home = program.placement.inverse()
+    tips, axes = home.apply(position + machine.tool_length * direction) * 1e3, home.rotate(-direction)
+    columns = {name: tips[:, k] for k, name in enumerate(POSE[:3])}
+    return {"time_s": program.times, **columns, **{name: axes[:, k] for k, name in enumerate(POSE[3:])}}
 
 
 def leg_names(robot: Robot) -> tuple[str, ...]:

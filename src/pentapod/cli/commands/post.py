@@ -84,7 +84,7 @@ def post(
         toolpath = None if plan is None else placed_toolpath(plan, read)
         progress("reading", 1.0, program.name)
         progress("writing", 0.0, name)
-        given = PostInput(read, _machine(read, program.parent, job, machine), toolpath, digest)
+        given = PostInput(read, program_machine(read, program.parent, job, machine), toolpath, digest)
         files = write_post(given, name, out, verdict=verdict, unverified=unverified)
     if as_json:
         echo_json({"format": name, "verified": not unverified, "files": [str(file) for file in files]})
@@ -94,7 +94,7 @@ def post(
     return 0
 
 
-def _machine(program: Program, folder: Path, job: Path | None, machine: str | None) -> Machine | None:
+def program_machine(program: Program, folder: Path, job: Path | None, machine: str | None) -> Machine | None:
     """Return the named machine, the shipped one that the program names, or that of the run in a folder; else None."""
     from pentapod.base.errors import MachineError
     from pentapod.job.build.values import job_machine

@@ -1,6 +1,6 @@
 """Posts: files of a program for controllers and other software; writer and reader of a format in one file."""
 
-from pentapod.program.posts import csv, drives, hdf5, linuxcnc, npz, ros, toolpaths
+from pentapod.program.posts import csv, drives, hdf5, linuxcnc, npz, ros, simulators, toolpaths
 from pentapod.program.posts.registry import (
     POSTS,
     Post,
@@ -32,6 +32,7 @@ __all__ = [
     "read_post",
     "register",
     "ros",
+    "simulators",
     "table_post",
     "toolpaths",
     "write_post",

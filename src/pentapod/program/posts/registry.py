@@ -65,7 +65,8 @@ class Post(Value):
     write: returns contents by file name, "folder/name" for files in folders; same input, same bytes. A content that
     starts with "#!" becomes an executable file. read: from the folder to the program, or to the toolpath where the post
     writes that; raises ProgramError or ToolpathError with file and line. loses: what cannot be read back, in words.
-    takes_toolpath: whether the post needs the toolpath as well as the program.
+    takes_toolpath: whether the post needs the toolpath as well as the program. readings: whether its rows are what the
+    legs read, not what drives with a leg model are told.
     """
 
     name: str
@@ -74,6 +75,7 @@ class Post(Value):
     read: Callable[[Path], Program | Toolpath]
     loses: frozenset[str] = field(default=frozenset())
     takes_toolpath: bool = False
+    readings: bool = False
 
 
 POSTS = Registry("post", GROUP, Post)
@@ -119,7 +121,7 @@ def write_post(
             remedy = "name the verdict.json of the program, or insist with unverified=True"
             raise InputError("there is no verdict on this program", key="verdict", remedy=remedy)
         check_passed(verdict, given.sha256 or sha256(csv_bytes(given.program)).hexdigest())
-    program = given.program if post.takes_toolpath else commanded(given.program, given.machine)
+    program = given.program if post.takes_toolpath or post.readings else commanded(given.program, given.machine)
     source = replace(program.provenance, unverified=unverified)
     contents = post.write(replace(given, program=replace(program, provenance=source)))
     if unverified:
@@ -149,8 +151,9 @@ def read_post(folder: str | Path, name: str, machine: Machine | None = None) -> 
     >>> read_post("npz", "npz").legs.shape == program.legs.shape
     True
     """
-    found = find_post(name).read(Path(folder))
-    return found if machine is None or not isinstance(found, Program) else read_back(found, machine)
+    post = find_post(name)
+    found = post.read(Path(folder))
+    return found if machine is None or post.readings or not isinstance(found, Program) else read_back(found, machine)
 
 
 def commanded(program: Program, machine: Machine | None) -> Program:

@@ -36,15 +36,19 @@ NANOSECONDS = 1_000_000_000  # in a second
 
 def _write(given: PostInput, style: Style) -> dict[str, bytes]:
     program = given.program
-    header, body = header_text(program), _message(program)
     if style == "yaml":
-        return {f"{_STEM}.yaml": (header + body).encode()}
-    return {f"{_STEM}.json": body.encode(), SIDECAR: header.encode()}
+        return {f"{_STEM}.yaml": trajectory_yaml(program)}
+    return {f"{_STEM}.json": _message(program).encode(), SIDECAR: header_text(program).encode()}
 
 
-def _message(program: Program) -> str:
+def trajectory_yaml(program: Program, zeros: Floats | float = 0.0) -> bytes:
+    """Return the message as YAML, below the header. zeros (n_legs,): what legs read where their joints are at zero."""
+    return (header_text(program) + _message(program, zeros)).encode()
+
+
+def _message(program: Program, zeros: Floats | float = 0.0) -> str:
     """Return the message as JSON, one point a line."""
-    columns = {"positions": (program.legs, 11)}
+    columns = {"positions": (program.legs - zeros, 11)}
     if program.interpolation == "cubic":
         columns |= {"velocities": (velocities(program), 12), "accelerations": (accelerations(program), 9)}
     texts = {name: _lists(values, digits) for name, (values, digits) in columns.items()}

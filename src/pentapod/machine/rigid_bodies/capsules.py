@@ -32,6 +32,13 @@ class Capsule:
         of_balls = ball * (83.0 / 320.0 * r**2 + (0.5 * length + 0.375 * r) ** 2)
         return self.mass * (of_cylinder + of_balls) / (cylinder + ball)
 
+    @property
+    def axial_inertia(self) -> float:
+        """Inertia about the axis, kg·m², of a homogeneous body."""
+        length, r = self.high - self.low, self.radius
+        cylinder, ball = length, 4.0 / 3.0 * r  # volumes over π r²
+        return self.mass * r**2 * (0.5 * cylinder + 0.4 * ball) / (cylinder + ball)
+
 
 def leg_cylinder(machine: Machine, leg: int) -> Capsule:
     """Return the fixed part of a leg; positions from the base joint."""
