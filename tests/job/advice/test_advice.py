@@ -18,7 +18,7 @@ from pentapod.job.advice.search import Advised, advised
 from pentapod.job.advice_on_errors import can_help
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
-from pentapod.job.pipeline import passes
+from pentapod.job.pipeline import refused_at
 from refused_jobs import REFUSED
 
 TOO_FAR = ("position_mm = [", "position_mm = [1000.0, 0, 700] # [")
@@ -78,20 +78,20 @@ def test_no_search_where_none_is_wanted(make_job, tmp_path):
     assert "advice" not in {stage.name for stage in outcome.stages}
 
 
-def searched(folder, name, passes, **options) -> Advised:
+def searched(folder, name, planned, **options) -> Advised:
     job = Job.load(REFUSED[name].write(folder))
-    given = (job, job_machine(job), job_mesh(job), None, passes, AdviceOptions(**options))
+    given = (job, job_machine(job), job_mesh(job), None, planned, AdviceOptions(**options))
     return advised(*given, lambda *_: None)
 
 
 def test_the_best_that_passes_comes_first_and_what_fails_is_no_advice(tmp_path):
     planned: list[Job] = []
 
-    def passes(job: Job, _) -> bool:
+    def plan(job: Job, _) -> str | None:
         planned.append(job)
-        return len(planned) > 2
+        return None if len(planned) > 2 else "placement"
 
-    found = searched(tmp_path, "table too low", passes, plans=4, wanted=3)
+    found = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
     assert len(planned) == 4
     assert len(found.advice) == 2
     assert 300.0 < planned[0].placement.table_z_mm < 600.0
@@ -109,25 +109,24 @@ def test_where_the_tool_body_touches_an_upright_tool_comes_first(make_job):
     touch = [Shortfall("tool body touches the part", ((3, 5),), 0.3, "mm")]
     for under in (None, 0.0):
         job = job.with_(toolpath={"under_mm": under})
-        given = (job, machine, mesh, toolpath, lambda *_: True, AdviceOptions(plans=1), lambda *_: None)
+        given = (job, machine, mesh, toolpath, lambda *_: None, AdviceOptions(plans=1), lambda *_: None)
         found = advised(*given, short=touch).advice
         upright = [each for each in found if each.toml == "[toolpath]\nunder_mm = 0.0"]
         assert [each.kept for each in upright] == pytest.approx([1.0] if under is None else [])
 
 
 def test_an_interruption_ends_the_search_and_keeps_what_was_found(tmp_path):
-    def passes(job: Job, _) -> bool:
+    def plan(job: Job, _) -> None:
         planned.append(job)
         if len(planned) > 1:
             raise KeyboardInterrupt
-        return True
 
     planned: list[Job] = []
-    found = searched(tmp_path, "table too low", passes, plans=4, wanted=3)
+    found = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
     assert found.interrupted
     assert len(planned) == 2
     assert len(found.advice) == 1
-    again = searched(tmp_path, "table too low", passes, plans=4, wanted=3)
+    again = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
     assert again.advice == ()
     assert again.sentence.startswith("The search was interrupted; tried until then: ")
 
@@ -142,7 +141,7 @@ def test_a_trial_whose_search_for_a_placement_is_interrupted_ends(tmp_path):
             signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
-        passes(Job.load(REFUSED["too far"].write(tmp_path)).with_(placement=dict.fromkeys(FIXED)), progress)
+        refused_at(Job.load(REFUSED["too far"].write(tmp_path)).with_(placement=dict.fromkeys(FIXED)), progress)
     assert any(note.startswith("interrupted") for note in notes)
 
 
@@ -154,12 +153,11 @@ def test_nothing_that_works_is_told(tmp_path):
 
 
 def test_a_part_far_too_large_gets_a_box_within_reach(tmp_path):
-    def passes(job: Job, _) -> bool:
+    def plan(job: Job, _) -> None:
         planned.append(job)
-        return True
 
     planned: list[Job] = []
-    found = searched(tmp_path, "plate of 3 x 2 m", passes, points=32, halvings=2)
+    found = searched(tmp_path, "plate of 3 x 2 m", plan, points=32, halvings=2)
     assert found.advice[0].words == "only what lies in a box"
     low, high = np.array(planned[0].part.region_box_mm)
     assert ((high - low)[:2] > 50.0).all()
