@@ -84,7 +84,7 @@ def advised(
             tried[words] = None
             progress("advice", 0.0, words)
 
-    about = (lambda words: reasons.update({words: None}), lambda: ended[-1])
+    about = (lambda words: reasons.update({words: None}), lambda: ended[-1], toolpath is not None and not short)
     trials = _trials(job, machine, mesh, toolpath, options, tell, *about)
     if toolpath is not None:
         claims = FailedClaims(job, machine, mesh, toolpath, failed, options, tell)
@@ -127,6 +127,7 @@ def _trials(
     tell: Tell,
     because: Because,
     ended: Ended,
+    placed: bool,
 ) -> Iterator[Trial]:
     """Yield the trials of the jobs to begin with."""
     for start in starts(job, machine, mesh, options, has_toolpath=toolpath is not None):
@@ -140,7 +141,7 @@ def _trials(
         if sketch is None or len(sketch.contacts) < FEWEST:
             continue
         settings = Settings(start.job, machine, start.mesh, sketch, path, options, tell)
-        trials = Trials(settings, because, ended)
+        trials = Trials(settings, because, ended, placed=placed and not start.changes)
         for trial in trials.all(own=bool(start.changes)):
             words, changes = joined(start.words, trial.words), merged(start.changes, trial.changes)
             yield replace(trial, words=words, changes=changes, kept=start.kept * trial.kept)

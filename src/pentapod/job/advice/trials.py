@@ -41,11 +41,12 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Trials:
-    """The trials of one job, from estimates for its settings."""
+    """The trials of one job, from estimates for its settings. placed: whether its own plan had a place for the part."""
 
     settings: Settings
     because: Because
     ended: Ended
+    placed: bool = False
 
     @property
     def options(self) -> AdviceOptions:
@@ -69,7 +70,7 @@ class Trials:
             yield from self._scarcely(own)
         for base in bases:
             # More set-ups are for parts that have no place in one: a program that fails in one fails again.
-            if base not in self._programmed:
+            if base not in self._programmed and not (self.placed and not base.words):
                 yield from self._setups(base)
         for base in bases:
             yield from self._smaller(base)
