@@ -6,6 +6,7 @@ import html
 import json
 import signal
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.cli.main import run as run_cli
 from pentapod.job import AdviceOptions, Job, advise, run
 from pentapod.job.advice.search import Advised, advised
+from pentapod.job.advice.settings import Settings
 from pentapod.job.advice_on_errors import can_help
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
@@ -113,6 +115,34 @@ def test_where_the_tool_body_touches_an_upright_tool_comes_first(make_job):
         found = advised(*given, short=touch).advice
         upright = [each for each in found if each.toml == "[toolpath]\nunder_mm = 0.0"]
         assert [each.kept for each in upright] == pytest.approx([1.0] if under is None else [])
+
+
+@pytest.mark.parametrize(("stage", "split"), [("placement", True), ("verdict", False)])
+def test_a_program_that_fails_is_not_split_into_setups(stage, split, tmp_path, monkeypatch):
+    """What has a place in one set-up is planned in one, and fails again; what fits by a hair is planned before less."""
+
+    def estimated(_, kinds, *__, **___):
+        one = bool((kinds[0].nominal == kinds[0].nominal[0]).all())
+        margin = 0.047 if one else 0.02 if len(kinds) > 1 else -1.0
+        return SimpleNamespace(
+            margin=margin, shortfalls=(), samples=kinds[0], candidate=SimpleNamespace(transform=None)
+        )
+
+    def plan(job: Job, _) -> str | None:
+        planned.append(job)
+        return stage
+
+    monkeypatch.setattr(Settings, "_best", estimated)
+    monkeypatch.setattr(Settings, "beyond_a_single_place", lambda _: ())
+    planned: list[Job] = []
+    job = Job.load(REFUSED["dome of 60 deg, no cone"].write(tmp_path))
+    machine, mesh = job_machine(job), job_mesh(job)
+    toolpath = job_toolpath(job, mesh, machine=machine)[0]
+    short = [Shortfall("leg 1 too short", ((0, 1),), 1.0, "mm")]
+    advised(job, machine, mesh, toolpath, plan, AdviceOptions(plans=4), lambda *_: None, short=short)
+    assert [each.axis.mode for each in planned[:2]] == ["fixed", "auto"]
+    assert {(each.part.region_box_mm, each.placement.setups) for each in planned[:2]} == {(None, 1)}
+    assert any(each.placement.setups > 1 for each in planned) == split
 
 
 def test_an_interruption_ends_the_search_and_keeps_what_was_found(tmp_path):

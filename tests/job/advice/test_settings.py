@@ -11,7 +11,9 @@ from pentapod.job.advice.parts import Regions
 from pentapod.job.advice.settings import Settings
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.build.tool import job_tool
+from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.mesh.query.distance import MeshDistance
 from refused_jobs import REFUSED
 
 
@@ -48,3 +50,16 @@ def test_boxes_about_a_hole_lie_beside_it(tmp_path):
         low, high = np.array(box.changes["part"]["region_box_mm"])
         assert (low[0] * high[0] > 0.0) == beside
         assert high[1] - low[1] == pytest.approx(90.0)
+
+
+def test_a_smaller_region_is_judged_at_places_that_the_tool_reaches(tmp_path):
+    """At the foot of a wall a ball's centre is a radius away from both sides, and so is its stem."""
+    job, machine, mesh, tool = loaded(tmp_path, "pocket_boss along normals")
+    toolpath = job_toolpath(job, mesh, machine=machine)[0]
+    for known, clear in ((None, False), (toolpath, True)):
+        box = Regions.of(job, mesh, tool, known, OPTIONS).boxed(0.9)
+        low, high = 1e-3 * np.array(box.changes["part"]["region_box_mm"])
+        places = box.sketch.contacts[: len(box.sketch.contacts) // 2]
+        assert ((places > low - 2e-6) & (places < high + 2e-6)).all()
+        centres = places + tool.tilt_centre * box.sketch.normals[: len(places)]
+        assert (MeshDistance.of(mesh).points(centres).distance.min() > 0.99 * tool.tilt_centre) == clear

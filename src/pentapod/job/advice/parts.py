@@ -72,9 +72,13 @@ class Regions:
 
     @cached_property
     def _places(self) -> Floats:
-        """Places (N, 3) that stand for the region."""
-        sketch = self.cuts or Sketch.of_region(self.job, self.mesh, self.tool, 2 * self.options.points)
-        return np.zeros((0, 3)) if sketch is None else sketch.contacts
+        """Places (N, 3), each of which stands for as much of the region's area."""
+        patch, (low, high) = Patch.of(self.mesh, job_region(self.job)), self._extents
+        patch = patch.refined(float((high - low).max()) / self.options.points**0.5)
+        area = np.cumsum(patch.areas)
+        shares = (np.arange(self.options.places) + 0.5) / self.options.places
+        rows = np.searchsorted(area, shares * float(area[-1]))
+        return patch.vertices[patch.faces[rows]].mean(axis=1)
 
     def _middle(self, half: Floats) -> Floats:
         """Return where a box with half extents (3,) is: about the middle, or where it holds much more of the region."""
