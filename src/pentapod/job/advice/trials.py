@@ -126,7 +126,7 @@ class Trials:
     def _bases(self) -> list[Setting]:
         """Return the settings from which other changes start: the best one, and the job's own.
 
-        Where the whole task is too wide for one set-up, the first one that fits for a box in its middle.
+        Where the whole task is too wide for one set-up, the first one that fits for a box of it.
         """
         if (best := self.settings.nearest) is not None:
             own = self.settings.looked_at[0]
@@ -134,11 +134,13 @@ class Trials:
         regions = self._all_regions
         if regions is None:
             return []
-        core = regions.boxed(self.options.first * self.settings.usual_share)
-        found = None if core is None else self.settings.first_that_fits(core.sketch)
-        return [] if found is None else [found]
+        for share in self.options.cores:
+            core = regions.boxed(share * self.settings.usual_share)
+            if core is not None and (found := self.settings.first_that_fits(core.sketch)) is not None:
+                return [found]
+        return []
 
-    @property
+    @cached_property
     def _all_regions(self) -> Regions | None:
         settings = self.settings
         return Regions.of(settings.job, settings.mesh, settings.sketch.tool, settings.toolpath, self.options)
