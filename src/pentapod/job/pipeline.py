@@ -77,15 +77,18 @@ def run(
             job, used, mesh, runner, *files, own_machine=own_machine, piece=piece, before=before, **rules
         )
         if piece is None and advice is not None:
-            again = partial(passes, machine=machine, limits=limits, claims=claims)
+            again = partial(refused_at, machine=machine, limits=limits, claims=claims)
             outcome = with_advice(task, mesh, outcome, again, advice, *files)
     return outcome
 
 
-def passes(job: Job, progress: Progress = silent, **given: Any) -> bool:
-    """Return whether a job is planned, with a verdict that passes; nothing is kept. given: other arguments of `run`.
+def refused_at(job: Job, progress: Progress = silent, **given: Any) -> str | None:
+    """Return the stage that refuses a job; None where its verdict passes. Nothing is kept. given: as for `run`.
 
     Raises InputError as `run`, and KeyboardInterrupt where it would go on with the best that a search found till then.
     """
     with tempfile.TemporaryDirectory() as folder:
-        return run(job, folder, ending_when_interrupted(progress), advice=None, **given).passed
+        outcome = run(job, folder, ending_when_interrupted(progress), advice=None, **given)
+    if outcome.passed:
+        return None
+    return "verdict" if outcome.refusal is None else outcome.refusal.stage

@@ -89,14 +89,14 @@ def with_advice(
     task: Task,
     mesh: Mesh,
     outcome: Outcome,
-    again: Callable[..., bool],
+    again: Callable[..., str | None],
     options: AdviceOptions,
     staging: Path,
     writers: Mapping[str, Writer],
 ) -> Outcome:
     """Search for changes with which a refused job is planned, and return the outcome whose refusal holds them.
 
-    again: plans a job and returns whether its verdict passes, as `pipeline.passes`.
+    again: plans a job and returns the stage that refuses it, if any, as `pipeline.refused_at`.
     """
     refusal, runner = outcome.refusal, task.runner
     if refusal is None:

@@ -117,12 +117,11 @@ class Patch:
             patch = patch.refined(size)
             centres = patch.vertices[patch.faces].mean(axis=1)
             bound = 2.0 * width + size
-            close = np.isfinite(np.asarray(tree.query(centres, distance_upper_bound=bound)[0]))
-            patch = patch.only(close)
+            patch = patch.only(_nearer(tree, centres, bound))
             if size <= longest:
                 break
             size = max(0.5 * size, longest)
-        return patch, np.isfinite(np.asarray(tree.query(patch.vertices, distance_upper_bound=width)[0]))
+        return patch, _nearer(tree, patch.vertices, width)
 
     def _halved(self, long: Bools) -> Patch:
         """Return the patch with the sides (F, 3) in `long` cut in the middle; neighbours agree on which."""
@@ -184,6 +183,28 @@ class Patch:
         if (values >= 0.0).all():
             return self
         return Patch(*trimmed(self.vertices, self.faces, self.normals, values, root))
+
+
+def _nearer(tree: KDTree, points: Floats, bound: float) -> Bools:
+    """Return which points (N, 3) are nearer than `bound` metres to one of a tree.
+
+    Points in small cubes are decided together where the middle of their cube is near enough, or far enough away. Among
+    many points at about the same distance, as in the middle of a round border, single searches take long.
+    """
+    if not len(points):
+        return np.zeros(0, dtype=np.bool_)
+    side = 0.125 * bound
+    cell = np.floor(points / side).astype(np.int64)
+    cell -= cell.min(axis=0)
+    _, first, cube = np.unique(
+        np.ravel_multi_index(tuple(cell.T), cell.max(axis=0) + 1), return_index=True, return_inverse=True
+    )
+    middle, spread = (np.floor(points[first] / side) + 0.5) * side, (1.0 + 1e-9) * 0.5 * np.sqrt(3.0) * side
+    away = np.asarray(tree.query(middle, distance_upper_bound=bound + spread)[0])
+    found = (away + spread < bound)[cube]
+    open_ = np.flatnonzero(~found & (away < np.inf)[cube])
+    found[open_] = np.isfinite(np.asarray(tree.query(points[open_], distance_upper_bound=bound)[0]))
+    return found
 
 
 _A, _B, _C, _AB, _BC, _CA = range(6)

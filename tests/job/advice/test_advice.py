@@ -6,6 +6,7 @@ import html
 import json
 import signal
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,10 +16,11 @@ from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.cli.main import run as run_cli
 from pentapod.job import AdviceOptions, Job, advise, run
 from pentapod.job.advice.search import Advised, advised
+from pentapod.job.advice.settings import Settings
 from pentapod.job.advice_on_errors import can_help
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
-from pentapod.job.pipeline import passes
+from pentapod.job.pipeline import refused_at
 from refused_jobs import REFUSED
 
 TOO_FAR = ("position_mm = [", "position_mm = [1000.0, 0, 700] # [")
@@ -78,20 +80,20 @@ def test_no_search_where_none_is_wanted(make_job, tmp_path):
     assert "advice" not in {stage.name for stage in outcome.stages}
 
 
-def searched(folder, name, passes, **options) -> Advised:
+def searched(folder, name, planned, **options) -> Advised:
     job = Job.load(REFUSED[name].write(folder))
-    given = (job, job_machine(job), job_mesh(job), None, passes, AdviceOptions(**options))
+    given = (job, job_machine(job), job_mesh(job), None, planned, AdviceOptions(**options))
     return advised(*given, lambda *_: None)
 
 
 def test_the_best_that_passes_comes_first_and_what_fails_is_no_advice(tmp_path):
     planned: list[Job] = []
 
-    def passes(job: Job, _) -> bool:
+    def plan(job: Job, _) -> str | None:
         planned.append(job)
-        return len(planned) > 2
+        return None if len(planned) > 2 else "placement"
 
-    found = searched(tmp_path, "table too low", passes, plans=4, wanted=3)
+    found = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
     assert len(planned) == 4
     assert len(found.advice) == 2
     assert 300.0 < planned[0].placement.table_z_mm < 600.0
@@ -109,25 +111,52 @@ def test_where_the_tool_body_touches_an_upright_tool_comes_first(make_job):
     touch = [Shortfall("tool body touches the part", ((3, 5),), 0.3, "mm")]
     for under in (None, 0.0):
         job = job.with_(toolpath={"under_mm": under})
-        given = (job, machine, mesh, toolpath, lambda *_: True, AdviceOptions(plans=1), lambda *_: None)
+        given = (job, machine, mesh, toolpath, lambda *_: None, AdviceOptions(plans=1), lambda *_: None)
         found = advised(*given, short=touch).advice
         upright = [each for each in found if each.toml == "[toolpath]\nunder_mm = 0.0"]
         assert [each.kept for each in upright] == pytest.approx([1.0] if under is None else [])
 
 
+@pytest.mark.parametrize(("stage", "split"), [("placement", True), ("verdict", False)])
+def test_a_program_that_fails_is_not_split_into_setups(stage, split, tmp_path, monkeypatch):
+    """What has a place in one set-up is planned in one, and fails again; what fits by a hair is planned before less."""
+
+    def estimated(_, kinds, *__, **___):
+        one = bool((kinds[0].nominal == kinds[0].nominal[0]).all())
+        margin = 0.047 if one else 0.02 if len(kinds) > 1 else -1.0
+        return SimpleNamespace(
+            margin=margin, shortfalls=(), samples=kinds[0], candidate=SimpleNamespace(transform=None)
+        )
+
+    def plan(job: Job, _) -> str | None:
+        planned.append(job)
+        return stage
+
+    monkeypatch.setattr(Settings, "_best", estimated)
+    monkeypatch.setattr(Settings, "beyond_a_single_place", lambda _: ())
+    planned: list[Job] = []
+    job = Job.load(REFUSED["dome of 60 deg, no cone"].write(tmp_path))
+    machine, mesh = job_machine(job), job_mesh(job)
+    toolpath = job_toolpath(job, mesh, machine=machine)[0]
+    short = [Shortfall("leg 1 too short", ((0, 1),), 1.0, "mm")]
+    advised(job, machine, mesh, toolpath, plan, AdviceOptions(plans=4), lambda *_: None, short=short)
+    assert [each.axis.mode for each in planned[:2]] == ["fixed", "auto"]
+    assert {(each.part.region_box_mm, each.placement.setups) for each in planned[:2]} == {(None, 1)}
+    assert any(each.placement.setups > 1 for each in planned) == split
+
+
 def test_an_interruption_ends_the_search_and_keeps_what_was_found(tmp_path):
-    def passes(job: Job, _) -> bool:
+    def plan(job: Job, _) -> None:
         planned.append(job)
         if len(planned) > 1:
             raise KeyboardInterrupt
-        return True
 
     planned: list[Job] = []
-    found = searched(tmp_path, "table too low", passes, plans=4, wanted=3)
+    found = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
     assert found.interrupted
     assert len(planned) == 2
     assert len(found.advice) == 1
-    again = searched(tmp_path, "table too low", passes, plans=4, wanted=3)
+    again = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
     assert again.advice == ()
     assert again.sentence.startswith("The search was interrupted; tried until then: ")
 
@@ -142,7 +171,7 @@ def test_a_trial_whose_search_for_a_placement_is_interrupted_ends(tmp_path):
             signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
-        passes(Job.load(REFUSED["too far"].write(tmp_path)).with_(placement=dict.fromkeys(FIXED)), progress)
+        refused_at(Job.load(REFUSED["too far"].write(tmp_path)).with_(placement=dict.fromkeys(FIXED)), progress)
     assert any(note.startswith("interrupted") for note in notes)
 
 
@@ -154,12 +183,11 @@ def test_nothing_that_works_is_told(tmp_path):
 
 
 def test_a_part_far_too_large_gets_a_box_within_reach(tmp_path):
-    def passes(job: Job, _) -> bool:
+    def plan(job: Job, _) -> None:
         planned.append(job)
-        return True
 
     planned: list[Job] = []
-    found = searched(tmp_path, "plate of 3 x 2 m", passes, points=32, halvings=2)
+    found = searched(tmp_path, "plate of 3 x 2 m", plan, points=32, halvings=2)
     assert found.advice[0].words == "only what lies in a box"
     low, high = np.array(planned[0].part.region_box_mm)
     assert ((high - low)[:2] > 50.0).all()

@@ -11,7 +11,9 @@ from pentapod.job.advice.parts import Regions
 from pentapod.job.advice.settings import Settings
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.build.tool import job_tool
+from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.mesh.query.distance import MeshDistance
 from refused_jobs import REFUSED
 
 
@@ -24,14 +26,14 @@ def loaded(folder, name):
 @pytest.mark.parametrize(("name", "never"), [("thick legs", "legs "), ("narrow base cones", "")])
 def test_a_machine_that_reaches_no_place_is_told_from_a_part_that_does_not_fit(name, never, tmp_path):
     job, machine, mesh, tool = loaded(tmp_path, name)
-    settings = Settings(job, machine, mesh, Sketch.of_region(job, mesh, tool, 24), OPTIONS, lambda _: None)
+    settings = Settings(job, machine, mesh, Sketch.of_region(job, mesh, tool, 24), None, OPTIONS, lambda _: None)
     short = settings.beyond_a_single_place()
     assert (short[0].constraint[: len(never)] == never) if never else short == ()
 
 
 def test_the_top_of_a_part_is_flat_and_as_deep_as_its_share(tmp_path):
     job, _, mesh, tool = loaded(tmp_path, "holder wider than a pocket")
-    found = Regions.of(job, mesh, tool, OPTIONS).top(0.1)
+    found = Regions.of(job, mesh, tool, None, OPTIONS).top(0.1)
     low, high = np.array(found.changes["part"]["region_box_mm"])
     top = 1e3 * mesh.bounds[1, 2]
     assert top - 3.0 < low[2] < top < high[2]
@@ -44,7 +46,20 @@ def test_boxes_about_a_hole_lie_beside_it(tmp_path):
     middle = np.abs(mesh.vertices[mesh.faces].mean(axis=1)[:, 0]) < 0.15
     holed = type(mesh).of(mesh.vertices, mesh.faces[~middle])
     for part, beside in ((mesh, False), (holed, True)):
-        box = Regions.of(job, part, tool, OPTIONS).boxed(0.1)
+        box = Regions.of(job, part, tool, None, OPTIONS).boxed(0.1)
         low, high = np.array(box.changes["part"]["region_box_mm"])
         assert (low[0] * high[0] > 0.0) == beside
         assert high[1] - low[1] == pytest.approx(90.0)
+
+
+def test_a_smaller_region_is_judged_at_places_that_the_tool_reaches(tmp_path):
+    """At the foot of a wall a ball's centre is a radius away from both sides, and so is its stem."""
+    job, machine, mesh, tool = loaded(tmp_path, "pocket_boss along normals")
+    toolpath = job_toolpath(job, mesh, machine=machine)[0]
+    for known, clear in ((None, False), (toolpath, True)):
+        box = Regions.of(job, mesh, tool, known, OPTIONS).boxed(0.9)
+        low, high = 1e-3 * np.array(box.changes["part"]["region_box_mm"])
+        places = box.sketch.contacts[: len(box.sketch.contacts) // 2]
+        assert ((places > low - 2e-6) & (places < high + 2e-6)).all()
+        centres = places + tool.tilt_centre * box.sketch.normals[: len(places)]
+        assert (MeshDistance.of(mesh).points(centres).distance.min() > 0.99 * tool.tilt_centre) == clear

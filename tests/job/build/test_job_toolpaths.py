@@ -9,14 +9,14 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from pentapod.base.errors import JobError
+from pentapod.base.errors import JobError, ToolpathError
 from pentapod.cli.commands.new import dome_stl
 from pentapod.cli.main import run as run_cli
 from pentapod.geometry import angle_between
 from pentapod.job import Job, run
 from pentapod.job.build.toolpath import job_toolpath, tool_in_world
 from pentapod.job.build.values import job_mesh
-from pentapod.toolpath import SegmentKind
+from pentapod.toolpath import SegmentKind, toolpath_with_report
 from pentapod.toolpath.formats import read_toolpath
 
 BALL = 'type = "ball"\ndiameter_mm = 10'
@@ -208,3 +208,30 @@ def test_axes_on_a_noisy_scan_are_smoothed_by_default(make_job):
         cuts = [segment for segment in path.segments if segment.kind is SegmentKind.CUT]
         turns.append(np.concatenate([angle_between(s.axes[1:], s.axes[:-1]) for s in cuts]).sum())
     assert turns[0] < 0.4 * turns[1]
+
+
+def test_the_passes_of_a_part_in_use_are_made_once(make_job, monkeypatch):
+    made: list[object] = []
+
+    def counted(*given):
+        made.append(given)
+        return toolpath_with_report(*given)
+
+    monkeypatch.setattr("pentapod.job.build.toolpath.toolpath_with_report", counted)
+    job = Job.load(make_job())
+    mesh = job_mesh(job)
+    first = job_toolpath(job, mesh)[0]
+    again = job_toolpath(job.with_(axis={"tilt_deg": 30.0}), job_mesh(job))[0]
+    assert len(made) == 1
+    np.testing.assert_array_equal(again.tips, first.tips)
+    job_toolpath(job.with_(toolpath={"stepover_mm": 14.0}), mesh)
+    assert len(made) == 2
+
+
+def test_a_path_that_bends_too_sharply_is_refused(make_job, tmp_path, monkeypatch):
+    def sharp(*_, **__):
+        raise ToolpathError("the path bends too sharply", key="path_tolerance", remedy="a larger tolerance.path_mm")
+
+    monkeypatch.setattr("pentapod.job.task.leg_path", sharp)
+    refusal = run(Job.load(make_job()), tmp_path / "out", advice=None).refusal
+    assert str(refusal) == "leg path: the path bends too sharply. It may take a larger tolerance.path_mm"

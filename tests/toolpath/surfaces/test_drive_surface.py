@@ -262,3 +262,9 @@ def test_axes_along_a_corner_are_midway_between_its_walls(lean):
     assert len(axes) > 10
     away = angle_between(axes, turn @ UP)
     assert np.degrees(away).max() < 0.5
+
+
+def test_a_part_in_use_has_one_drive_surface_however_far_passes_go_under(pocket):
+    again = DriveSurface.of(pocket.part, R, UP, DriveOptions().leaning(1.0))
+    assert again.mesh is pocket.mesh
+    assert DriveSurface.of(pocket.part, R, UP, replace(DriveOptions(), step=0.5)).mesh is not pocket.mesh

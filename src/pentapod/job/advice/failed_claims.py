@@ -101,7 +101,7 @@ class FailedClaims:
             self.tell(words)
             if self._left(changes) <= most:
                 yield Trial(words, changes, 1.0, 1.0)
-        if (regions := Regions.of(self.job, self.mesh, self._tool, self.options)) is None:
+        if (regions := Regions.of(self.job, self.mesh, self._tool, self.toolpath, self.options)) is None:
             return
         self.tell("a smaller region_angle_deg")
         for degrees in self.options.angles_deg:

@@ -21,6 +21,7 @@ from pentapod.job.schema.job import Job
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.region_share import RegionShare
+from pentapod.toolpath.toolpath import Toolpath
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,21 +36,27 @@ class Smaller:
 
 @dataclass(frozen=True, eq=False)
 class Regions:
-    """Smaller regions of one job. area: share of the surface in its own region, 0 to 1."""
+    """Smaller regions of one job. area: share of the surface in its own region, 0 to 1.
+
+    cuts: places of its toolpath that cut, where it is known. A region may hold what no tool reaches: feet of walls,
+    and what is hidden.
+    """
 
     job: Job
     mesh: Mesh
     tool: Tool
     area: float
+    cuts: Sketch | None
     options: AdviceOptions
 
     @classmethod
-    def of(cls, job: Job, mesh: Mesh, tool: Tool, options: AdviceOptions) -> Regions | None:
+    def of(cls, job: Job, mesh: Mesh, tool: Tool, toolpath: Toolpath | None, options: AdviceOptions) -> Regions | None:
         """Return the regions of a job; None where its strategy covers none, or it holds nothing."""
         if not covers_region(job):
             return None
         area = RegionShare.of(mesh, job_region(job)).inside
-        return cls(job, mesh, tool, area, options) if area > 0.0 else None
+        cuts = None if toolpath is None else Sketch.of_cuts(job, mesh, tool, toolpath, options.cuts)
+        return cls(job, mesh, tool, area, cuts, options) if area > 0.0 else None
 
     def flatter(self, degrees: float) -> Smaller | None:
         """Return the part of the region within an angle of its direction; None where that is nothing, or all."""
@@ -64,17 +71,25 @@ class Regions:
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
     @cached_property
-    def _middle(self) -> Floats:
-        """Where boxes are about (3,): the middle, or the place of the region that is nearest to it, around a hole."""
+    def _places(self) -> Floats:
+        """Places (N, 3), each of which stands for as much of the region's area."""
+        patch, (low, high) = Patch.of(self.mesh, job_region(self.job)), self._extents
+        patch = patch.refined(float((high - low).max()) / self.options.points**0.5)
+        area = np.cumsum(patch.areas)
+        shares = (np.arange(self.options.places) + 0.5) / self.options.places
+        rows = np.searchsorted(area, shares * float(area[-1]))
+        return patch.vertices[patch.faces[rows]].mean(axis=1)
+
+    def _middle(self, half: Floats) -> Floats:
+        """Return where a box with half extents (3,) is: about the middle, or where it holds much more of the region."""
         low, high = self._extents
-        middle, around = 0.5 * (low + high), 0.5 * self.options.hole * float((high - low).max())
-        sketch = Sketch.of_region(self.job, self.mesh, self.tool, self.options.points)
-        if sketch is None:
-            return middle
-        across = np.abs(sketch.contacts - middle)
-        across[:, self._along] = 0.0
-        nearest = int(across.max(axis=1).argmin())
-        return middle if across[nearest].max() <= around else sketch.contacts[nearest]
+        middles = np.clip(self._places, low + half, high - half)
+        middles = np.concatenate([[0.5 * (low + high)], middles[:: max(len(middles) // self.options.points, 1)]])
+        across = np.delete(np.arange(3), self._along)
+        inside = np.abs(self._places[None, :, across] - middles[:, None, across]) <= half[across]
+        held = inside.all(axis=2).sum(axis=1)
+        most = int(held.argmax())
+        return middles[most] if held[most] > self.options.elsewhere * held[0] else middles[0]
 
     @property
     def _view(self) -> Floats:
@@ -93,7 +108,8 @@ class Regions:
         """
         low, high = self._extents
         half = 0.5 * np.minimum(high - low, share * float((high - low).max()))
-        corners = np.stack([self._middle - half, self._middle + half])
+        middle = self._middle(half)
+        corners = np.stack([middle - half, middle + half])
         corners[:, self._along] = self._depths(share if deep else None)
         if deep and self._flat:
             return None
@@ -136,7 +152,10 @@ class Regions:
         try:
             job = self.job.with_(part=keys)
             share = RegionShare.of(self.mesh, job_region(job)).inside / self.area
-            sketch = Sketch.of_region(job, self.mesh, self.tool, self.options.points)
+            if self.cuts is None:
+                sketch = Sketch.of_region(job, self.mesh, self.tool, self.options.points)
+            else:
+                sketch = self.cuts.in_region(job, self.mesh, self.options.points)
         except InputError:  # the box is flat
             return None
         return None if sketch is None else Smaller(words, {"part": keys}, sketch, min(float(share), 1.0))

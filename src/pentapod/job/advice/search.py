@@ -17,7 +17,7 @@ from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.settings import TOUCHES, Settings, Tell, joined, merged
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.advice.starts import starts
-from pentapod.job.advice.trials import FEWEST, Because, Trial, Trials
+from pentapod.job.advice.trials import FEWEST, Because, Ended, Trial, Trials
 from pentapod.job.build.tool import job_tool
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
@@ -25,8 +25,11 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify.verdict.verdict import Certificate
 
-Passes = Callable[[Job, Progress], bool]
-"""Plans a job, all stages, and returns whether its verdict passed. Raises KeyboardInterrupt where it is interrupted."""
+Planned = Callable[[Job, Progress], str | None]
+"""Plans a job, all stages, and returns the stage that refused it; None where its verdict passed.
+
+Raises KeyboardInterrupt where it is interrupted.
+"""
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ def advised(
     machine: Machine,
     mesh: Mesh,
     toolpath: Toolpath | None,
-    passes: Passes,
+    planned: Planned,
     options: AdviceOptions,
     progress: Progress,
     failed: Mapping[str, Certificate] = MappingProxyType({}),
@@ -74,13 +77,15 @@ def advised(
     tried: dict[str, None] = {}
     reasons: dict[str, None] = {}
     count, interrupted = options.replans if failed else options.plans, False
+    ended: list[str | None] = [None]
 
     def tell(words: str) -> None:
         if words:
             tried[words] = None
             progress("advice", 0.0, words)
 
-    trials = _trials(job, machine, mesh, toolpath, options, tell, lambda words: reasons.update({words: None}))
+    about = (lambda words: reasons.update({words: None}), lambda: ended[-1], toolpath is not None and not short)
+    trials = _trials(job, machine, mesh, toolpath, options, tell, *about)
     if toolpath is not None:
         claims = FailedClaims(job, machine, mesh, toolpath, failed, options, tell)
         touches = any(each.constraint.startswith(TOUCHES) for each in short)
@@ -88,7 +93,8 @@ def advised(
     try:
         for number, trial in enumerate(islice(trials, count)):
             tried[trial.words] = None
-            if _passes(passes, job, trial, partial(_told, progress, (number + 0.5) / count, trial.words)):
+            ended.append(_ended(planned, job, trial, partial(_told, progress, (number + 0.5) / count, trial.words)))
+            if ended[-1] is None:
                 changes = (Change(table, *item) for table, keys in trial.changes.items() for item in keys.items())
                 found.append(Advice(tuple(changes), trial.words, trial.kept, trial.whole))
             if len(found) == options.wanted:
@@ -104,12 +110,12 @@ def _told(progress: Progress, share: float, words: str, stage: str, fraction: fl
     progress("advice", share, f"planning: {words}: {stage}")
 
 
-def _passes(passes: Passes, job: Job, trial: Trial, progress: Progress) -> bool:
-    """Return whether a job passes with the changes of a trial."""
+def _ended(planned: Planned, job: Job, trial: Trial, progress: Progress) -> str | None:
+    """Return the stage that refuses a job with the changes of a trial; None where it passes."""
     try:
-        return passes(job.with_(**trial.changes), progress)
+        return planned(job.with_(**trial.changes), progress)
     except InputError:  # nothing to machine, or values that do not go with each other
-        return False
+        return "input"
 
 
 def _trials(
@@ -120,19 +126,22 @@ def _trials(
     options: AdviceOptions,
     tell: Tell,
     because: Because,
+    ended: Ended,
+    placed: bool,
 ) -> Iterator[Trial]:
     """Yield the trials of the jobs to begin with."""
     for start in starts(job, machine, mesh, options, has_toolpath=toolpath is not None):
         tell(start.words)
         tool = job_tool(start.job, machine)
-        path = start.toolpath if start.changes else toolpath
+        path = start.toolpath if start.changes else start.toolpath or toolpath
         if path is None:
             sketch = Sketch.of_region(start.job, start.mesh, tool, options.points)
         else:
             sketch = Sketch.of_toolpath(start.job, start.mesh, tool, path, options.points)
         if sketch is None or len(sketch.contacts) < FEWEST:
             continue
-        trials = Trials(Settings(start.job, machine, start.mesh, sketch, options, tell), because)
+        settings = Settings(start.job, machine, start.mesh, sketch, path, options, tell)
+        trials = Trials(settings, because, ended, placed=placed and not start.changes)
         for trial in trials.all(own=bool(start.changes)):
             words, changes = joined(start.words, trial.words), merged(start.changes, trial.changes)
             yield replace(trial, words=words, changes=changes, kept=start.kept * trial.kept)

@@ -27,6 +27,7 @@ from pentapod.planning.problem.common_axis import CommonAxis
 from pentapod.planning.problem.constraints import FREE
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
+from pentapod.toolpath.toolpath import Toolpath
 
 Tell = Callable[[str], None]
 """Takes words for what is tried."""
@@ -61,12 +62,13 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class Settings:
-    """The settings of one job, and estimates for them."""
+    """The settings of one job, and estimates for them. sketch: of its toolpath, where that is known."""
 
     job: Job
     machine: Machine
     mesh: Mesh
     sketch: Sketch
+    toolpath: Toolpath | None
     options: AdviceOptions
     tell: Tell
 

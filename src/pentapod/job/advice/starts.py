@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,7 @@ _SIDES = tuple(tuple(sign if k == axis else 0.0 for k in range(3)) for axis in (
 class Start:
     """A job to begin with. words, changes: empty for the job as it is. kept: as in `Advice`.
 
-    toolpath: of this job, where it is not made from the region.
+    toolpath: of this job, where it was made.
     """
 
     words: str
@@ -63,13 +63,23 @@ def starts(
         yield _lifted(own, machine) or own
         return
     region = RegionShare.of(mesh, job_region(job)).inside > 0.0
+    key = "region"
     if region:
         yield from _of_other_size(job, machine, mesh, options)
-        if has_toolpath or _is_too_large(own, machine) or _has_toolpath(own, machine):
+        if has_toolpath or _is_too_large(own, machine):
             yield own
             return
-    others = [*_with_other_paths(job, machine, mesh, options), *_with_a_region(job, mesh)]
-    yield from (start for start in (others if region else _with_a_region(job, mesh)) if _has_toolpath(start, machine))
+        made = _with_toolpath(own, machine)
+        if isinstance(made, Start):
+            yield made
+            return
+        key = made.key
+    # Where there is nothing to machine, other passes over it come last.
+    regions, others = _with_a_region(job, mesh), _with_other_paths(job, machine, mesh, options) if region else ()
+    for start in (*regions, *others) if key == "region" else (*others, *regions):
+        made = _with_toolpath(start, machine)
+        if isinstance(made, Start):
+            yield made
 
 
 def _is_too_large(own: Start, machine: Machine) -> bool:
@@ -81,12 +91,12 @@ def _is_too_large(own: Start, machine: Machine) -> bool:
     return False
 
 
-def _has_toolpath(start: Start, machine: Machine) -> bool:
+def _with_toolpath(start: Start, machine: Machine) -> Start | InputError:
+    """Return a start with its toolpath, or the error that there is none."""
     try:
-        job_toolpath(start.job, start.mesh, machine=machine)
-    except InputError:
-        return False
-    return True
+        return replace(start, toolpath=job_toolpath(start.job, start.mesh, machine=machine)[0])
+    except InputError as error:
+        return error
 
 
 def _lifted(own: Start, machine: Machine) -> Start | None:

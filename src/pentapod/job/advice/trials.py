@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import islice, pairwise
 
 import numpy as np
@@ -23,6 +24,9 @@ FEWEST = 4
 Because = Callable[[str], None]
 """Takes words for why nothing else is tried, or what stands in the way of all that was."""
 
+Ended = Callable[[], str | None]
+"""Returns the stage that refused the last trial; None where it passed, or there was none."""
+
 
 @dataclass(frozen=True, eq=False)
 class Trial:
@@ -37,10 +41,12 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Trials:
-    """The trials of one job, from estimates for its settings."""
+    """The trials of one job, from estimates for its settings. placed: whether its own plan had a place for the part."""
 
     settings: Settings
     because: Because
+    ended: Ended
+    placed: bool = False
 
     @property
     def options(self) -> AdviceOptions:
@@ -60,6 +66,12 @@ class Trials:
             self.because(f"no pose of the tool was found, whatever the part: {limits}; it is the machine, or the tool")
             return
         touching = next((setting for setting in settings.looked_at if setting.touches), None)
+        if not too_wide:
+            yield from self._scarcely(own)
+        for base in bases:
+            # More set-ups are for parts that have no place in one: a program that fails in one fails again.
+            if base not in self._programmed and not (self.placed and not base.words):
+                yield from self._setups(base)
         for base in bases:
             yield from self._smaller(base)
         if touching is not None:
@@ -86,15 +98,35 @@ class Trials:
             if setting.found.margin < self.options.comfortable:
                 scant.append(setting)
             else:
-                yield Trial(setting.words, setting.changes, 1.0, 1.0)
+                yield from self._of_setting(setting)
         # Of about the same margin, those count that are cheap to plan.
         for setting in sorted(scant, key=lambda s: -round(s.found.margin, 2)):
-            yield Trial(setting.words, setting.changes, 1.0, 1.0)
+            yield from self._of_setting(setting)
+
+    def _of_setting(self, setting: Setting) -> Iterator[Trial]:
+        yield Trial(setting.words, setting.changes, 1.0, 1.0)
+        if self.ended() not in (None, "placement"):
+            self._programmed.append(setting)
+
+    @cached_property
+    def _programmed(self) -> list[Setting]:
+        """The settings that had a place for the part in their plans, and failed later."""
+        return []
+
+    def _scarcely(self, own: bool) -> Iterator[Trial]:
+        """Yield the best change of tool axes and placement that fits by its estimate, but hardly: a plan finds more."""
+        scarce = [
+            setting
+            for setting in self.settings.looked_at
+            if (own or setting.words) and self.options.scarcely <= setting.found.margin < self.options.enough
+        ]
+        for setting in sorted(scarce, key=lambda s: -s.found.margin)[:1]:
+            yield from self._of_setting(setting)
 
     def _bases(self) -> list[Setting]:
         """Return the settings from which other changes start: the best one, and the job's own.
 
-        Where the whole task is too wide for one set-up, the first one that fits for a box in its middle.
+        Where the whole task is too wide for one set-up, the first one that fits for a box of it.
         """
         if (best := self.settings.nearest) is not None:
             own = self.settings.looked_at[0]
@@ -102,18 +134,19 @@ class Trials:
         regions = self._all_regions
         if regions is None:
             return []
-        core = regions.boxed(self.options.first * self.settings.usual_share)
-        found = None if core is None else self.settings.first_that_fits(core.sketch)
-        return [] if found is None else [found]
+        for share in self.options.cores:
+            core = regions.boxed(share * self.settings.usual_share)
+            if core is not None and (found := self.settings.first_that_fits(core.sketch)) is not None:
+                return [found]
+        return []
 
-    @property
+    @cached_property
     def _all_regions(self) -> Regions | None:
         settings = self.settings
-        return Regions.of(settings.job, settings.mesh, settings.sketch.tool, self.options)
+        return Regions.of(settings.job, settings.mesh, settings.sketch.tool, settings.toolpath, self.options)
 
     def _smaller(self, base: Setting) -> Iterator[Trial]:
-        """Yield changes that keep less, or need more set-ups or another tool."""
-        yield from self._setups(base)
+        """Yield changes that keep less, or need another tool."""
         regions = sorted(self._regions(base), key=lambda trial: -trial.worth)
         yield from (trial for trial in regions if trial.worth >= self.options.worth_length)
         yield from self._lengths(base)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from typing import Any, cast
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from pentapod.base.arrays import Floats
 from pentapod.base.errors import MeshError, ToolpathError
 from pentapod.base.keys import fields_from
 from pentapod.base.progress import Progress, silent
@@ -40,12 +42,18 @@ from pentapod.toolpath.gouge.report import GougeOptions, Remedy
 from pentapod.toolpath.lines.scallop import stepover_for
 from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.options import PathOptions
+from pentapod.toolpath.path_report import PathReport
 from pentapod.toolpath.strategies.registry import STRATEGIES
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 RATE_SLACK = 1.05
 """Factor on the cap of the axis's turn: it holds along the contact points, not along the tilt centres."""
 
+
+_KNOWN: WeakKeyDictionary[Mesh, dict[tuple[Tool, PathOptions, bytes], tuple[Toolpath, PathReport]]] = (
+    WeakKeyDictionary()
+)
+"""Toolpaths over parts that are in use: many changes of a job, as of its placement, leave its passes as they are."""
 
 BESIDE = 0.2
 """Share of the gouge tolerance that is kept for a motion beside the path."""
@@ -144,7 +152,7 @@ def job_toolpath(
         if covers_region(job):
             region.append(region_report(job, mesh))
         try:
-            toolpath, report = toolpath_with_report(mesh, tool, asked, kept_axis(job))
+            toolpath, report = _along_the_part(mesh, tool, asked, kept_axis(job))
         except (MeshError, ToolpathError) as error:
             raise in_words_of(job, error) from error
         toolpath = stepped(oriented(toolpath, tool, _orientation(job, tool)), job.toolpath.si.axis_step)
@@ -163,6 +171,15 @@ def job_toolpath(
     if job.feed.dwell_s is not None:
         toolpath = toolpath.stopping(job.feed.dwell_s)
     return toolpath, Reports(tuple(reports))
+
+
+def _along_the_part(mesh: Mesh, tool: Tool, options: PathOptions, axis: Floats | None) -> tuple[Toolpath, PathReport]:
+    """Return the toolpath and the report of a strategy, with the axes along the normals or along one direction."""
+    known = _KNOWN.setdefault(mesh, {})
+    key = tool, options, b"" if axis is None else axis.tobytes()
+    if key not in known:
+        known[key] = toolpath_with_report(mesh, tool, options, axis)
+    return known[key]
 
 
 def _remedies(job: Job) -> tuple[Remedy, ...]:

@@ -27,7 +27,7 @@ from pentapod.toolpath.surfaces.ball_centres import BallCentres, smoothed
 from pentapod.toolpath.surfaces.places import DriveOptions
 from pentapod.toolpath.surfaces.rolled_surface import RolledSurface
 
-_KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, DriveOptions, bytes], tuple[FacetTree, Mesh]]] = WeakKeyDictionary()
+_KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, float, int, bytes], tuple[FacetTree, Mesh]]] = WeakKeyDictionary()
 """Drive surfaces of parts that are in use: planning and the verdict need the same."""
 
 
@@ -68,7 +68,8 @@ class DriveSurface(RolledSurface):
         """
         options = options or DriveOptions()
         window = None if region is None else _window(part, radius, view, options, region)
-        key = radius, options, b"" if window is None else window.box.tobytes() + window.view.tobytes()
+        asked = b"" if window is None else window.box.tobytes() + window.view.tobytes()
+        key = radius, options.step, options.parts, asked
         known = _KNOWN.setdefault(part, {})
         if key not in known:
             tree = FacetTree.of(part)
