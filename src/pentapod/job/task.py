@@ -187,7 +187,8 @@ class Task:
         except ToolpathError as error:
             if error.key != "path_tolerance":
                 raise
-            return Refusal("leg path", error.what, remedy=f"It may take {error.remedy}")
+            cause = "the path bends too sharply to measure its length"
+            return Refusal("leg path", cause, remedy=f"It may take {error.remedy}")
 
     def _program(self, placed: PlacedPath, trajectory: Trajectory, file: Path) -> Program:
         made_on = (processor_kind(), library_versions())

@@ -230,8 +230,9 @@ def test_the_passes_of_a_part_in_use_are_made_once(make_job, monkeypatch):
 
 def test_a_path_that_bends_too_sharply_is_refused(make_job, tmp_path, monkeypatch):
     def sharp(*_, **__):
-        raise ToolpathError("the path bends too sharply", key="path_tolerance", remedy="a larger tolerance.path_mm")
+        raise ToolpathError("too sharp", key="path_tolerance", remedy="a larger tolerance.path_mm")
 
     monkeypatch.setattr("pentapod.job.task.leg_path", sharp)
     refusal = run(Job.load(make_job()), tmp_path / "out", advice=None).refusal
-    assert str(refusal) == "leg path: the path bends too sharply. It may take a larger tolerance.path_mm"
+    cause = "the path bends too sharply to measure its length"
+    assert str(refusal) == f"leg path: {cause}. It may take a larger tolerance.path_mm"

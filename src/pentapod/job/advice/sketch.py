@@ -21,7 +21,7 @@ from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
-IN_REGION, IN_REGION_M = 1e-3, 1e-6
+IN_REGION, IN_REGION_M = 0.001, 1e-6
 """By how much normals (cosines) and points (metres) may be outside of a region: passes lie exactly on its borders."""
 
 
