@@ -38,7 +38,7 @@ class Line:
 
 
 def compare_page(runs: Sequence[ViewedRun], token: str) -> str:
-    """Return the page that compares runs, which are shown under /1, /2, …"""
+    """Return the page that compares runs, which are shown under `/1` and `/2`."""
     names = [run.opened.folder.as_posix() for run in runs]
     return page_text(
         "compare.html.j2", {"compare": True}, live=True, runs=names, token=token, figures=_figures(runs),

@@ -11,7 +11,6 @@ import numpy as np
 
 from pentapod.base.errors import ArrayError, InputError
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job.build.placement import rotation_angles_deg
 from pentapod.job.clamped.placed_job import placement_in
 from pentapod.view.opened_run import OpenedRun
 from pentapod.view.replan import Replanned, Replanning

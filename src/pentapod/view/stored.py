@@ -32,6 +32,9 @@ T = TypeVar("T")
 READ_BACK, IN_THE_MIDDLE = "the run in the folder", "nothing: without a placement the part is in the middle of the work"
 """By what the placement of a stored run was chosen, for the page."""
 
+SAME_M = 1e-7
+"""Metres within which a station is that of a segment's beginning."""
+
 _LAW: dict[str, tuple[str, tuple[int | None, ...]]] = {
     "trajectory.time_s": ("f", (None,)),
     "trajectory.station_mm": ("f", (None,)),
@@ -39,16 +42,18 @@ _LAW: dict[str, tuple[str, tuple[int | None, ...]]] = {
     "trajectory.active": ("iu", (None,)),
     "trajectory.shares": ("f", (None,)),
     "trajectory.constraint_names": ("U", (None,)),
+    "trajectory.piece_starts_s": ("f", (None,)),
 }
 """Arrays of plan.npz: kinds of numbers, as NumPy names them, and shapes."""
 
 
 @dataclass(frozen=True, eq=False)
 class StoredLaw:
-    """A time law read back: its profile, and at which stations (S,) the toolpath's segments begin, metres."""
+    """A time law read back: its profile, when its pieces (L,) begin, in seconds, and the segments (S,), in metres."""
 
     profile: Profile
-    starts: Floats
+    pieces: Floats
+    segments: Floats
 
     @property
     def duration(self) -> float:
@@ -56,10 +61,15 @@ class StoredLaw:
         return float(self.profile.times[-1])
 
     def segment(self, t: ArrayLike) -> Ints:
-        """Return the index (n,) of the toolpath's segment at each time."""
-        stations = np.interp(np.asarray(t, dtype=np.float64), self.profile.times, self.profile.stations)
-        at = np.searchsorted(self.starts, stations, side="right") - 1
-        return np.clip(at, 0, len(self.starts) - 1).astype(np.intp)
+        """Return the index (n,) of the toolpath's segment at each time; at a stop the one before it."""
+        times = np.asarray(t, dtype=np.float64)
+        ended = np.searchsorted(self.segments + SAME_M, self._station(times), side="left") - 1
+        begun = np.searchsorted(self.segments - SAME_M, self._station(self.pieces), side="right") - 1
+        piece = np.searchsorted(self.pieces, times, side="right") - 1
+        return np.maximum(np.maximum(ended, begun[np.maximum(piece, 0)]), 0).astype(np.intp)
+
+    def _station(self, times: Floats) -> Floats:
+        return np.interp(times, self.profile.times, self.profile.stations)
 
 
 def placed_path(run: OpenedRun) -> PlacedPath:
@@ -84,14 +94,14 @@ def stored_law(run: OpenedRun, placed: PlacedPath) -> StoredLaw | None:
         return None
     for name, form in _LAW.items():
         check_array(arrays[name], name, file, InputError, *form)
-    times, stations, speeds, active, shares, names = (arrays[name] for name in _LAW)
+    times, stations, speeds, active, shares, names, pieces = (arrays[name] for name in _LAW)
     profile = Profile(
         times, to_si(stations, "mm"), to_si(speeds, "mm_s"), active.astype(np.intp), shares,
         tuple(str(name) for name in names),
     )  # fmt: skip
     travelled = arc_length(placed.tips)
     scale = profile.stations[-1] / travelled[-1] if travelled[-1] > 0.0 else 0.0
-    return StoredLaw(profile, travelled[run.toolpath.starts[:-1]] * scale)
+    return StoredLaw(profile, pieces[:-1], travelled[run.toolpath.starts[:-1]] * scale)
 
 
 def stored_outcome(run: OpenedRun, placed: PlacedPath) -> Outcome:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pentapod.report.words import duration, number
+from pentapod.report.words import number
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.view.opened_run import OpenedRun
 from pentapod.view.replan import Replanned
@@ -10,14 +10,13 @@ from pentapod.view.study import Reach
 
 
 def run_words(run: OpenedRun) -> str:
-    """Return what the run is, as text."""
-    whole = "" if run.piece is None else f"One of several set-ups, {run.piece}. "
+    """Return what is not as usual about a run, as text; empty where all is."""
+    found = [] if run.piece is None else [f"One of several set-ups, {run.piece}."]
     if run.program is None:
-        return f"{whole}There is no program. Drag the part to where it fits."
-    lines = [f"{whole}Component {run.component}, {duration(run.program.duration)}, {len(run.toolpath):,} waypoints."]
-    if not run.same_job:
-        lines.append("The job was changed after this program was made.")
-    return " ".join(lines)
+        found.append("There is no program. Drag the part to where it fits.")
+    elif not run.same_job:
+        found.append("The job was changed after this program was made.")
+    return " ".join(found)
 
 
 def reach_words(reach: Reach) -> str:
