@@ -6,10 +6,13 @@ import errno
 import json
 import os
 import threading
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from socket import SHUT_RDWR, socket
 from socketserver import TCPServer
 from types import TracebackType
+from typing import Any, cast
 from urllib.parse import urlsplit
 
 from pentapod.base.errors import InputError, PentapodError
@@ -100,13 +103,30 @@ class _Server(ThreadingHTTPServer):
     """Has the runs by the first part of their paths."""
 
     daemon_threads = True
-    block_on_close = False  # a browser keeps its connections
     allow_reuse_address = os.name != "nt"  # there it would share a port that is in use
 
     def __init__(self, access: Access, port: int) -> None:
         self.access = access
         self.runs: dict[str, ServedRun] = {}
+        self._connections: set[socket] = set()
         super().__init__((access.host, port), _Handler)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Keep the connection, to end it with the server."""
+        self._connections.add(request)
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """End a connection."""
+        self._connections.discard(request)
+        super().shutdown_request(request)
+
+    def server_close(self) -> None:
+        """End all connections: browsers keep them."""
+        super().server_close()
+        for connection in tuple(self._connections):
+            with suppress(OSError):
+                connection.shutdown(SHUT_RDWR)
 
     def server_bind(self) -> None:
         """Bind without asking for the name of the address, which may take long."""
@@ -117,18 +137,21 @@ class _Server(ThreadingHTTPServer):
 class _Handler(BaseHTTPRequestHandler):
     """Pages by GET, answers in JSON by POST."""
 
-    server: _Server
     protocol_version = "HTTP/1.1"
     disable_nagle_algorithm = True
     timeout = 600
+
+    @property
+    def _own(self) -> _Server:
+        return cast("_Server", self.server)
 
     def do_GET(self) -> None:
         """Send a page: of the only run, of both, or of one of them."""
         if self._is_refused():
             return
-        runs, name = self.server.runs, urlsplit(self.path).path.strip("/")
+        runs, name = self._own.runs, urlsplit(self.path).path.strip("/")
         if not name and len(runs) > 1:
-            page = compare_page([run.viewed for run in runs.values()], self.server.access.token).encode()
+            page = compare_page([run.viewed for run in runs.values()], self._own.access.token).encode()
         elif (run := runs.get(name or "1")) is not None:
             page = run.page
         else:
@@ -147,7 +170,7 @@ class _Handler(BaseHTTPRequestHandler):
         if self._is_refused():
             return
         number, _, name = urlsplit(self.path).path.strip("/").partition("/")
-        run, answer, status = self.server.runs.get(number), None, HTTPStatus.OK
+        run, answer, status = self._own.runs.get(number), None, HTTPStatus.OK
         try:
             answer = None if run is None else run.answer(name, read_json(body))
         except PentapodError as error:
@@ -158,7 +181,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _is_refused(self) -> bool:
         """Whether a request may not be answered; that is sent."""
-        refused = self.server.access.refusal(self.path, self.headers)
+        refused = self._own.access.refusal(self.path, self.headers)
         if refused:
             self.close_connection = True
             self._send(HTTPStatus.FORBIDDEN, f"{refused}\n".encode())

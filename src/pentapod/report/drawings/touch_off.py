@@ -76,7 +76,7 @@ def touch_off_text(points: list[TouchOff]) -> str:
         places = [from_si(value, "mm") for value in (point.on_part, point.in_machine, point.tip)]
         values = np.concatenate([*places, point.axis, from_si(point.legs, "mm")])
         lines.append(
-            ",".join([f"{number}", f"{point.waypoint}", *(f"{round(v, 5) + 0.0:.5f}" for v in values.tolist())])
+            ",".join([f"{number}", f"{point.waypoint}", *(f"{round(v, 6) + 0.0:.6f}" for v in values.tolist())])
         )
     return "\n".join(lines) + "\n"
 
