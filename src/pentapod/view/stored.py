@@ -149,7 +149,8 @@ def _refusal(content: Mapping[str, Any] | None) -> Refusal | None:
         for entry in content["diagnosis"]
     )
     advice = tuple(_advice(entry) for entry in content.get("advice", ()))
-    return Refusal(content["stage"], content["cause"], diagnosis, content["remedy"], advice)
+    stage, cause, remedy = (content[name] for name in ("stage", "cause", "remedy"))
+    return Refusal(stage, cause, diagnosis, remedy, advice)
 
 
 def _advice(entry: Mapping[str, Any]) -> Advice:

@@ -21,7 +21,7 @@ export class Live {
     this.colours = ramp(data.ramp);
     if (view) this._addTo(view, points);
     this._onPanel();
-    if (self !== top) document.body.classList.add("framed");
+    if (self !== top) this._becomeFramed();
     fold();
     this._moved(true);
     this._follow();
@@ -45,6 +45,14 @@ export class Live {
       if (!value) this._moved(true);
     });
     this.handles.addEventListener("objectChange", () => this._moved(false));
+  }
+
+  /** In a frame of the page that compares runs: the scene alone, without handles. */
+  _becomeFramed() {
+    document.body.classList.add("framed");
+    if (!this.handles) return;
+    this.handles.enabled = false;
+    this.handles.getHelper().visible = false;
   }
 
   _onPanel() {
