@@ -33,7 +33,7 @@ test-all: $(READY)  ## everything, the long forms too
 test-lowest:  ## a part of the fast suite with the lowest versions that pyproject.toml allows, in an environment of its own
 	rm -rf out/lowest && $(PYTHON) -m venv out/lowest
 	sed -nE 's/^ *"([A-Za-z0-9_.-]+)[>=]=([0-9.]+)".*/\1==\2/p' pyproject.toml | sort -u > out/lowest/constraints.txt
-	out/lowest/bin/python -m pip install --quiet --constraint out/lowest/constraints.txt --editable ".[plot,hdf5,drawings,sim,view]" $(ORACLES)
+	out/lowest/bin/python -m pip install --quiet --constraint out/lowest/constraints.txt --editable ".[plot,hdf5,drawings,sim]" $(ORACLES)
 	out/lowest/bin/python -m pytest -q -m "not slow" $(LOWEST_TESTS)
 
 lock:  ## constraints.txt anew: the newest releases that fit together, with the hashes of their files, from the index that pip uses
@@ -109,7 +109,7 @@ reference: $(READY)  ## the pages of docs/reference, from the code
 
 pictures: $(READY)  ## the screenshots of the documentation, from the tests that open a browser
 	mkdir -p out/shots
-	PENTAPOD_SHOTS=out/shots $(BIN)/pytest tests/report/test_report_in_browser.py tests/report/test_sheet_in_browser.py tests/view/test_viewer.py -k "drawn or draws or prints"
+	PENTAPOD_SHOTS=out/shots $(BIN)/pytest tests/report/test_report_in_browser.py tests/report/test_sheet_in_browser.py tests/view/test_viewer_in_browser.py -k "drawn or draws or prints"
 	cp out/shots/report.png out/shots/report-first.png out/shots/sheet.png out/shots/view.png docs/
 
 site: $(READY)  ## the documentation as a site, in site/

@@ -1,9 +1,9 @@
 """How often a second the viewer judges a placement while the part is dragged, against judging pose by pose.
 
-Run ``make bench-view`` after ``make demo``, or name the folder of another run. Each update judges every limit at all
-waypoints that are drawn and colours them, at places a few millimetres and degrees about the plan's. The peer asks the
-same margins of one waypoint after the other, as a loop in Python would; of some waypoints, for it takes long. A second
-figure is the look at all waypoints when the part is let go; a third that with the best lean at each by itself.
+Run ``make bench-view`` after ``make demo``, or name the folder of another run. Each update judges every limit at the
+waypoints that are judged while it is dragged, at places a few millimetres and degrees about the plan's. The peer asks
+the same margins of one waypoint after the other, as a loop in Python would; of some waypoints, for it takes long.
+A second figure is the look at all waypoints when the part is let go; a third that with the best lean at each by itself.
 CPU seconds of one process.
 """
 
@@ -43,21 +43,21 @@ def main() -> None:
     places: list[RigidTransform] = []
     for _ in range(PLACES):
         turn = Rotation.from_rotvec(rng.normal(0.0, np.radians(2.0), 3)).as_matrix()
-        about = run.placement.apply(study.task.tilt_centres.mean(axis=0))
+        about = run.placement.apply(study.samples.tilt_centres.mean(axis=0))
         moved = RigidTransform(turn, about - turn @ about + rng.normal(0.0, 3e-3, 3))
         places.append(moved @ run.placement)
 
     def drawn(place: RigidTransform) -> object:
-        reach = study.at(place)
-        return reach.colours(study.shown)
+        return study.at(place).margins
 
+    count = len(study.at(run.placement).rows)
     some = study.shown[:: max(1, len(study.shown) // LOOPED)]
 
     def looped(place: RigidTransform) -> list[float]:
         found: list[float] = []
         for row in some:
             only = np.array([row])
-            poses = study.task.machine_poses(place, study.axes[only], only)
+            poses = study.samples.machine_poses(place, study.axes[only], only)
             found.append(float(study.margins(*poses, place).min()))
         return found
 
@@ -65,9 +65,9 @@ def main() -> None:
     one = seconds(looped, places[:4]) / len(some)
     let_go = seconds(lambda place: study.at(place, thorough=True), places[:4])
     tilted = seconds(lambda place: study.at(place, tilted=True), places[:4])
-    count, total = len(study.shown), len(study.task.tilt_centres)
+    total = len(study.samples.tilt_centres)
     print(f"{platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}")
-    print(f"{run.folder}: {count:,} waypoints drawn of {total:,}, {len(study.margins.limits)} limits at each")
+    print(f"{run.folder}: {count:,} waypoints judged of {total:,}, {len(study.margins.limits)} limits at each")
     print(
         f"dragged: {1e3 * update:.1f} ms, {1.0 / update:.0f} updates a second, {1e6 * update / count:.1f} µs a waypoint"
     )

@@ -18,7 +18,8 @@ from pentapod.planning import PlacedPath
 from pentapod.program import read_csv
 from pentapod.program.posts import PostInput
 from pentapod.report import write_report
-from pentapod.view import ToolMotion, open_run
+from pentapod.view import open_run
+from pentapod.view.viewed import ViewedRun
 
 DESK = (resources.files("pentapod.machine") / "library" / "desk.toml").read_text(encoding="utf-8")
 GUIDES = "[guides]\nleast_mm = -40\ngreatest_mm = [40, 40, 40, 0, 40]\n\n[legs]"
@@ -63,8 +64,12 @@ def test_guides_from_the_plan_to_the_verdict(job, tmp_path):
 
     opened = open_run(tmp_path)
     np.testing.assert_array_equal(opened.machine.rail_positions, rail_positions)
-    pose = ToolMotion.of(opened).machine_pose(program.times[40], opened.machine, opened.placement)
-    assert pose.legs == pytest.approx(program.legs[40], abs=1e-9)
+    shown = ViewedRun.of(opened)
+    pose = opened.machine.robot.leg_lengths(
+        shown.signals.tips[40] + opened.machine.tool_length * shown.signals.axes[40], -shown.signals.axes[40]
+    )
+    assert pose == pytest.approx(program.legs[40], abs=1e-9)
+    assert shown.placed.placement.rail_positions == pytest.approx(rail_positions)
 
     text = (tmp_path / "program.csv").read_text()
     line = re.search(r"# guides_mm = \[.*\]\n", text)[0]

@@ -22,8 +22,8 @@ from pentapod.report.sheet import write_sheet
 from pentapod.toolpath import Toolpath
 from pentapod.toolpath.linking.partition import cutting_intervals
 from pentapod.view import open_run
-from pentapod.view.panel import run_words
 from pentapod.view.replan import replanned
+from pentapod.view.words import run_words
 from usual_job import job_text
 
 EACH = {"program.csv", "plan.npz", "verdict.json", "manifest.json"}

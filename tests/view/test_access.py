@@ -2,81 +2,74 @@
 
 from __future__ import annotations
 
-import shutil
+import re
 import socket
-import time
-import urllib.error
-import urllib.request
+from email.message import Message
 
 import pytest
+from asked import address, ask, at, page_of
 
-from pentapod.base.errors import InputError
-from pentapod.view import Viewer, open_run
-from pentapod.view.access import Access, load_viser, open_server
+from pentapod.view import Viewer
+from pentapod.view.access import TOKEN_HEADER, Access
 
-viser = pytest.importorskip("viser", reason="viser is not installed")
-pytestmark = [
-    pytest.mark.filterwarnings("ignore::ResourceWarning"),
-    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
-]
 FOREIGN = "https://evil.example"
 
 
 @pytest.fixture(scope="module")
-def viewer(planned, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("access")
-    shutil.copytree(planned[0], folder / "job")
-    with Viewer(open_run(folder / "job" / "out"), port=18300) as viewer:
+def viewer(opened):
+    with Viewer(opened, port=18300) as viewer:
         yield viewer
 
 
-def address(viewer):
-    """Host with port, and token."""
-    base, _, token = viewer.url.partition("/?token=")
-    return base.removeprefix("http://"), token
-
-
-def handshake(viewer, *, query="", host=None, headers=()):
-    """The status of a web socket's handshake over a bare connection, and all that came within half a second."""
+def sent(viewer, first, *headers, host=None, body=b""):
+    """The status of an answer over a bare connection, and all of it."""
     here, _ = address(viewer)
     name, port = here.split(":")
-    lines = [
-        f"GET /{query} HTTP/1.1", f"Host: {host or here}", "Upgrade: websocket", "Connection: Upgrade",
-        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Version: 13",
-        f"Sec-WebSocket-Protocol: viser-v{viser.__version__}", *headers,
-    ]  # fmt: skip
+    lines = [first, *([] if host == "" else [f"Host: {host or here}"]), "Connection: close", *headers]
     with socket.create_connection((name, int(port)), timeout=30.0) as connection:
-        connection.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
-        said = connection.recv(65536)
-        connection.settimeout(0.5)
-        try:
-            while more := connection.recv(65536):
-                said += more
-        except TimeoutError:
-            pass
+        connection.sendall(("\r\n".join(lines) + "\r\n\r\n").encode("latin-1") + body)
+        said = b""
+        while more := connection.recv(65536):
+            said += more
     return int(said.split()[1]), said
 
 
-def refused(viewer, **given):
-    status, said = handshake(viewer, **given)
-    return status == 403 and b"/part" not in said and len(said) < 1000
+def got(viewer, query="", *headers, host=None):
+    return sent(viewer, f"GET /{query} HTTP/1.1", *headers, host=host)
 
 
-def test_who_has_the_address_gets_the_scene(viewer):
+def posted(viewer, *headers, host=None):
+    """A plan is asked for, which writes files."""
+    body = b'{"placement": [1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]}'
+    return sent(viewer, "POST /1/plan HTTP/1.1", f"Content-Length: {len(body)}", *headers, host=host, body=body)
+
+
+def refused(viewer, query="", *headers, host=None):
+    """Whether neither the page nor an answer is given."""
+    token = query.removeprefix("?token=")
+    for status, said in (
+        got(viewer, query, *headers, host=host),
+        posted(viewer, f"{TOKEN_HEADER}: {token}", *headers, host=host),
+    ):
+        if status != 403 or b"placement" in said or len(said) > 1000:
+            return False
+    return not ask(viewer, "state")["plans"]
+
+
+def test_who_has_the_address_gets_the_page(viewer):
     here, token = address(viewer)
     for headers in ((), (f"Origin: http://{here}",)):
-        status, said = handshake(viewer, query=f"?token={token}", headers=headers)
-        assert status == 101
-        assert len(said) > 10_000
-    port = here.split(":")[1]
-    assert handshake(viewer, query=f"?token={token}", host=f"localhost:{port}")[0] == 101
+        status, said = got(viewer, f"?token={token}", *headers)
+        assert status == 200
+        assert len(said) > 100_000
+    assert got(viewer, f"?token={token}", host=f"localhost:{here.split(':')[1]}")[0] == 200
 
 
 @pytest.mark.parametrize("origin", [FOREIGN, "null", "http://127.0.0.1:1", "http://127.0.0.1.evil.example:18300", "file://",
                                     "http://[::1", ""])  # fmt: skip
 def test_foreign_origins_get_nothing_even_with_the_token(viewer, origin):
     _, token = address(viewer)
-    assert refused(viewer, query=f"?token={token}", headers=[f"Origin: {origin}"])
+    assert refused(viewer, f"?token={token}", f"Origin: {origin}")
 
 
 @pytest.mark.parametrize(
@@ -85,94 +78,71 @@ def test_foreign_origins_get_nothing_even_with_the_token(viewer, origin):
 def test_foreign_hosts_get_nothing_even_with_the_token(viewer, host):
     """A name that somebody points here (DNS rebinding): then Origin and Host agree."""
     _, token = address(viewer)
-    assert refused(viewer, query=f"?token={token}", host=host, headers=[f"Origin: http://{host}"])
-    assert refused(viewer, query=f"?token={token}", host=host)
+    assert refused(viewer, f"?token={token}", f"Origin: http://{host}", host=host)
+    assert refused(viewer, f"?token={token}", host=host)
 
 
 def test_two_hosts_or_origins_are_none(viewer):
     here, token = address(viewer)
-    assert handshake(viewer, query=f"?token={token}", headers=["Host: evil.example"])[0] != 101
-    own = f"Origin: http://{here}"
-    assert refused(viewer, query=f"?token={token}", headers=[own, f"Origin: {FOREIGN}"])
+    assert refused(viewer, f"?token={token}", "Host: evil.example")
+    assert refused(viewer, f"?token={token}", f"Origin: http://{here}", f"Origin: {FOREIGN}")
+    assert refused(viewer, f"?token={token}", host="")
 
 
-@pytest.mark.parametrize("query", ["", "?token=", "?token=wrong", "?token=%C3%A9", "?Token={token}", "?token={token}x"])
+@pytest.mark.parametrize(
+    "query", ["", "?token=", "?token=wrong", "?token=\xe9", "?Token={token}", "?token={token}x", "?token=//[{token}"]
+)
 def test_without_the_token_nothing_is_sent_and_nothing_can_be_written(viewer, query):
     here, token = address(viewer)
     query = query.replace("{token}", token)
-    assert refused(viewer, query=query)
-    assert refused(viewer, query=query, headers=[f"Origin: http://{here}"])
-    assert refused(viewer, query=query, headers=["Cookie: pentapod=" + token])
-    with pytest.raises(urllib.error.HTTPError, match="403"):
-        urllib.request.urlopen(f"http://{here}/{query}", timeout=30.0)
+    assert got(viewer, query)[0] == 403
+    assert refused(viewer, query.replace("?Token=" + token, "?token=no"))
+    assert got(viewer, query, f"Origin: http://{here}", f"Cookie: token={token}")[0] == 403
 
 
-def test_the_page_keeps_the_token_for_its_own_socket(viewer):
-    here, token = address(viewer)
-    with urllib.request.urlopen(viewer.url, timeout=30.0) as page:
-        cookie = page.headers["Set-Cookie"]
-    assert "SameSite=Strict" in cookie
-    assert "HttpOnly" in cookie
-    kept = cookie.split(";")[0]
-    assert token in kept
-    assert handshake(viewer, headers=[f"Cookie: other=1; {kept}", f"Origin: http://{here}"])[0] == 101
-    assert refused(viewer, headers=[f"Cookie: {kept}", f"Origin: {FOREIGN}"])
-    request = urllib.request.Request(f"http://{here}/", headers={"Cookie": kept})
-    with urllib.request.urlopen(request, timeout=30.0) as page:
-        assert page.headers["Set-Cookie"] is None
+def test_the_page_may_ask_its_own_server_alone(viewer):
+    text, headers = page_of(viewer)
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', text)[1].replace("&#39;", "'")
+    rules = dict(rule.strip().split(" ", 1) for rule in policy.split(";"))
+    assert rules["default-src"] == "'none'"
+    assert rules["connect-src"] == rules["frame-src"] == "'self'"
+    assert rules["script-src"].startswith("'sha256-")
+    assert headers["Content-Security-Policy"] == "frame-ancestors 'self'"
+    assert headers["Referrer-Policy"] == "no-referrer"
+    assert headers["Cache-Control"] == "no-store"
+    assert "Set-Cookie" not in headers
+    assert "Access-Control-Allow-Origin" not in headers
 
 
-def test_no_tunnel_is_opened(viewer, monkeypatch):
-    """Not even for a client that was answered."""
-    import msgspec
-    from viser import _tunnel
-    from websockets.sync.client import connect
-    from websockets.typing import Subprotocol
-
-    opened = []
-    monkeypatch.setattr(_tunnel.ViserTunnel, "__init__", lambda *_, **__: opened.append("tunnel"))
-    protocols = [Subprotocol(f"viser-v{viser.__version__}")]
-    with connect(viewer.url.replace("http", "ws"), subprotocols=protocols, max_size=None) as client:
-        client.recv(timeout=30.0)
-        client.send(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
-        time.sleep(0.5)
-    assert opened == []
-    assert viewer._server.request_share_url() is None
+def test_what_is_no_question_is_an_error(viewer, opened):
+    _, token = address(viewer)
+    own = f"{TOKEN_HEADER}: {token}"
+    for length in ("x", "-1", "99999999999", "1e3"):
+        assert sent(viewer, "POST /1/margins HTTP/1.1", own, f"Content-Length: {length}")[0] == 400
+    assert sent(viewer, "POST /1/margins HTTP/1.1", own)[0] == 400
+    assert "not JSON" in ask(viewer, "margins", b"{", expected=400)["error"]
+    assert "not JSON" in ask(viewer, "margins", [1], expected=400)["error"]
+    far = at(opened.placement)["placement"]
+    for wrong in ([], far[:11], [*far, 0.0], [2.0 * v for v in far], ["x"] * 12, [[1.0] * 12] * 9, [float("nan")] * 12):
+        assert "not a placement" in ask(viewer, "margins", {"placement": wrong}, expected=400)["error"]
+    assert "not a placement" in ask(viewer, "plan", {}, expected=400)["error"]
+    ask(viewer, "nothing", {}, expected=404)
+    ask(viewer, "margins", at(opened.placement), number=2, expected=404)
+    assert got(viewer, f"nothing?token={token}")[0] == 404
+    assert got(viewer, f"../../etc/passwd?token={token}")[0] == 404
+    assert sent(viewer, f"PUT /?token={token} HTTP/1.1")[0] == 501
 
 
 def test_listening_to_all_lets_addresses_in_but_no_names():
-    from websockets.datastructures import Headers
-    from websockets.http11 import Request
-
     access = Access("0.0.0.0")
 
     def answer(host):
-        return access.refusal(Request(f"/?token={access.token}", Headers(Host=host)))
+        headers = Message()
+        headers["Host"] = host
+        return access.refusal(f"/?token={access.token}", headers)
 
     assert {answer(host) for host in ("10.1.2.3:8080", "[fe80::1]:8080", "localhost:8080", socket.gethostname())} == {
         ""
     }
     assert all(answer(host) for host in ("evil.example", "10.1.2.3.evil.example:8080"))
     assert access.token not in repr(access)
-
-
-def test_another_version_of_viser_is_refused(monkeypatch):
-    monkeypatch.setattr(viser, "__version__", "1.2.0")
-    with pytest.raises(InputError, match=r"viser: .*other web pages.*1\.2\.0.*pip install \"viser==1\.1\.1\""):
-        load_viser()
-
-
-def test_a_server_that_cannot_be_guarded_is_not_opened(monkeypatch):
-    stopped = []
-
-    class Unguarded:
-        def __init__(self, **_):
-            pass
-
-        def stop(self):
-            stopped.append(self)
-
-    monkeypatch.setattr(viser, "ViserServer", Unguarded)
-    with pytest.raises(InputError, match="let every web page connect"):
-        open_server(Access("127.0.0.1"), 18390)
-    assert stopped

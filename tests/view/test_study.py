@@ -13,7 +13,6 @@ from pentapod.geometry import RigidTransform
 from pentapod.planning import PlacedPath
 from pentapod.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.view import Study
-from pentapod.view.study import COMFORTABLE, margin_colours
 
 SHIFTS = st.tuples(*[st.floats(-0.4, 0.4)] * 3)
 
@@ -79,17 +78,6 @@ def test_the_best_lean_is_no_worse_than_none(opened, study):
         assert leaning.margins.min() > standing.margins.min()
 
 
-@given(st.lists(st.floats(-2.0, 2.0), min_size=2, max_size=50))
-def test_colours_go_from_red_to_green(margins):
-    ordered = np.sort(margins)
-    red, green, _ = margin_colours(ordered).astype(int).T
-    within = ordered >= 0.0
-    assert (np.diff((green - red)[within]) >= -1).all(), "more room is never redder"
-    assert (margin_colours(ordered)[~within] == (128, 0, 32)).all()
-    assert (red > green)[~within].all()
-    assert (green > red)[ordered >= COMFORTABLE].all()
-
-
 def test_a_long_path_is_thinned_and_keeps_the_ends_of_its_passes():
     from pentapod.view.study import drawn_waypoints
 
@@ -108,8 +96,8 @@ def test_many_waypoints_are_judged_evenly(opened):
     run = dataclasses.replace(opened, toolpath=toolpath, axes=toolpath.axes)
     study = Study.of(run)
     quick, thorough = study.at(run.placement), study.at(run.placement, thorough=True)
-    assert len(quick.rows) < 3_000
+    assert len(quick.rows) <= 1_501
+    assert len(study.at(run.placement, tilted=True).rows) <= 401
     assert len(thorough.rows) == 20_000
     assert {quick.rows[0], quick.rows[-1]} == {thorough.rows[0], thorough.rows[-1]} == {0, count - 1}
     assert thorough.worst.margin <= quick.worst.margin + 1e-3
-    assert quick.colours(study.shown).shape == (len(study.shown), 3)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pentapod.base.arrays import Floats, Ints, set_frozen
 from pentapod.geometry.interpolant import Interpolant
@@ -16,8 +17,26 @@ from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.limits.margins import Margins
 from pentapod.program.program import Program
 from pentapod.report.figure import DETAIL
-from pentapod.timing.time_law.trajectory import Trajectory
+from pentapod.timing.time_law.trajectory import Profile
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
+
+
+class TimeLaw(Protocol):
+    """What signals need of a `Trajectory`: its profile, and the toolpath's segment at a time."""
+
+    @property
+    def profile(self) -> Profile:
+        """Speeds and active limits at the gridpoints."""
+        ...
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        ...
+
+    def segment(self, t: ArrayLike) -> Ints:
+        """Return the index (n,) of the toolpath's segment at each time."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +71,12 @@ class Signals:
         cls,
         program: Program,
         machine: Machine,
-        trajectory: Trajectory,
+        law: TimeLaw,
         toolpath: Toolpath,
         collision_world: CollisionWorld = NOTHING,
         limits: Sequence[LimitKind] = (),
     ) -> Signals:
-        """Return the signals of a program. The trajectory gives the segment and the active limit at a time.
+        """Return the signals of a program. The time law gives the segment and the active limit at a time.
 
         collision_world: what legs, spindle and tool must not touch. limits: kinds of limits on poses besides
         pentapod's own.
@@ -65,7 +84,7 @@ class Signals:
         times = program.times
         joined = Interpolant.through(program.legs, program.period, program.interpolation)
         tips, axes = _poses(program, machine)
-        segments = trajectory.segment(np.minimum(times, trajectory.duration))
+        segments = law.segment(np.minimum(times, law.duration))
         speeds = np.linalg.norm(np.gradient(tips, program.period, axis=0), axis=1)
         if toolpath.tilt_centre < 0.0:
             spots = tips + toolpath.tilt_centre * axes
@@ -78,7 +97,7 @@ class Signals:
         rows = np.unique(np.append(np.arange(0, len(times), step), len(times) - 1)).astype(np.intp)
         values = margins(tips[rows], axes[rows], program.placement)
         names = tuple(limit.name for limit in margins.limits)
-        profile = trajectory.profile
+        profile = law.profile
         at = np.clip(np.searchsorted(profile.times, times, side="right") - 1, 0, len(profile.active) - 1)
         return cls(
             times, program.legs, joined.first, joined.second, tips, axes, speeds, feeds[segments], segments,

@@ -55,7 +55,7 @@ class OpenedRun(Value):
     machine: with its guides as in the program.
     piece: of the job's toolpath, where the run is one of several set-ups.
     program: None where the job was refused; then the part is in the middle of the work volume with nominal axes,
-    unless a placement was found. same_job: whether the program was made from the job as it is now.
+    unless a placement was found (is_placed). same_job: whether the program was made from the job as it is now.
     """
 
     folder: Path
@@ -71,6 +71,7 @@ class OpenedRun(Value):
     program: Program | None
     same_job: bool
     piece: Piece | None = None
+    is_placed: bool = True
 
 
 def open_run(folder: str | Path, job: str | Path | None = None, progress: Progress = silent) -> OpenedRun:
@@ -104,7 +105,7 @@ def open_run(folder: str | Path, job: str | Path | None = None, progress: Progre
     return OpenedRun(
         folder, loaded, machine, mesh, job_tool(loaded, machine), toolpath, job_collision_world(loaded, machine, mesh),
         placement, component, axes, program, program is None or program.provenance.job_digest == loaded.digest,
-        piece_in(arrays),
+        piece_in(arrays), is_placed="placed.axes" in arrays,
     )  # fmt: skip
 
 

@@ -1,76 +1,82 @@
-"""Viewer: server of the live view: play the motion, drag the part, see its margins, plan again there."""
+"""Viewer: server of the live page: the standard library's, with answers to what the page asks."""
 
 from __future__ import annotations
 
-import io
+import errno
+import json
+import os
 import threading
-import time
-from contextlib import redirect_stdout
+from contextlib import suppress
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from socket import SHUT_RDWR, socket
+from socketserver import TCPServer
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import Any, cast
+from urllib.parse import urlsplit
 
-from pentapod.base.errors import PentapodError
-from pentapod.geometry.rigid import RigidTransform
-from pentapod.toolpath.linking.partition import Piece
-from pentapod.view.access import Access, open_server
-from pentapod.view.motion import ToolMotion
+from pentapod.base.errors import InputError, PentapodError
+from pentapod.view.access import Access
+from pentapod.view.compare import compare_page
 from pentapod.view.opened_run import OpenedRun
-from pentapod.view.panel import Panel, machine_pose_words, place_words, reach_words
-from pentapod.view.replan import Replanned, replanned
-from pentapod.view.scene import ViewerScene
-from pentapod.view.study import Reach, Study
+from pentapod.view.served import ServedRun, read_json
 
-if TYPE_CHECKING:
-    import viser
+MOST_BYTES = 1 << 20
+"""Of what a request brings along: a placement file at most."""
 
-FRAME_S = 1.0 / 30.0
-"""Seconds between frames of the playback."""
+PORTS = 100
+"""How many ports are tried, from the first one on."""
+
+HEADERS = {
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",  # the address has the token
+    "X-Content-Type-Options": "nosniff",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Content-Security-Policy": "frame-ancestors 'self'",
+}
+"""Of each answer, beside the page's own Content-Security-Policy."""
 
 
 class Viewer:
-    """A server that shows one run, until it is stopped. Also a context manager.
+    """A server that shows one run, or two side by side, until it is stopped. Also a context manager.
 
     host, port: address; the next free port where that one is in use. Only requests with the token in `url` are answered
-    (`access`). While the part is dragged, the margins of the latest placement are computed; those passed meanwhile are
-    skipped. Raises InputError without viser, or with a version of it that was not tested.
+    (`access`). Raises InputError where a file of a run is broken, or the address cannot be listened on.
     """
 
-    def __init__(self, run: OpenedRun, *, host: str = "127.0.0.1", port: int = 8080) -> None:
+    def __init__(
+        self, run: OpenedRun, other: OpenedRun | None = None, *, host: str = "127.0.0.1", port: int = 8080
+    ) -> None:
         self._access = Access(host)
-        self._server: viser.ViserServer = open_server(self._access, port)
-        self._stopped, self._moved = threading.Event(), threading.Event()
-        self._lock, self._planning = threading.RLock(), threading.Lock()  # of the scene; of planning again
-        self._thorough = False
-        self.reach: Reach
-        self.replanned: Replanned | None = None
-        self._show(run)
-        self._threads = [threading.Thread(target=loop, daemon=True) for loop in (self._follow_drags, self._play)]
-        for thread in self._threads:
-            thread.start()
+        self._server = _server(self._access, port)
+        try:
+            for number, each in enumerate((run,) if other is None else (run, other), start=1):
+                self._server.runs[f"{number}"] = ServedRun(each, self._access.token, f"/{number}")
+        except BaseException:
+            self._server.server_close()
+            raise
+        self._thread = threading.Thread(target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True)
+        self._thread.start()
 
     @property
     def url(self) -> str:
         """The address for the browser, with the token."""
-        return f"http://{self._server.get_host()}:{self._server.get_port()}/?token={self._access.token}"
+        host = f"[{self._access.host}]" if ":" in self._access.host else self._access.host
+        return f"http://{host}:{self._server.server_port}/?token={self._access.token}"
 
     @property
-    def placement(self) -> RigidTransform:
-        """The present placement."""
-        return self._scene.placement
-
-    def move(self, placement: RigidTransform) -> None:
-        """Move the part to a placement, as if it had been dragged there."""
-        self._scene.set_placement(placement)
-        self._moved_part(thorough=True)
+    def runs(self) -> tuple[ServedRun, ...]:
+        """The runs that are shown."""
+        return tuple(self._server.runs.values())
 
     def stop(self) -> None:
-        """End the server."""
-        self._stopped.set()
-        self._moved.set()
-        for thread in self._threads:
-            thread.join()
-        with redirect_stdout(io.StringIO()):
-            self._server.stop()
+        """End the server, and a plan that is being made."""
+        self._server.shutdown()
+        self._server.server_close()
+        self._thread.join()
+        for run in self.runs:
+            run.stop()
 
     def __enter__(self) -> Viewer:
         return self
@@ -80,96 +86,113 @@ class Viewer:
     ) -> None:
         self.stop()
 
-    def _show(self, run: OpenedRun) -> None:
-        """Draw a run, and connect its controls."""
-        study, motion = Study.of(run), ToolMotion.of(run)
-        with self._lock, self._server.atomic():
-            self.run, self._study, self._motion = run, study, motion
-            self._server.scene.reset()
-            self._server.gui.reset()
-            self._scene = ViewerScene(self._server, run, study)
-            self.panel = panel = Panel(self._server, run, motion)
-        self._scene.part.on_update(lambda event: self._moved_part(thorough=event.phase == "end"))
-        panel.time.on_update(lambda _: self._show_machine_pose())
-        panel.tilted.on_update(lambda _: self._moved_part(thorough=True))
-        panel.back.on_click(lambda _: self.move(run.placement))
-        panel.replan.on_click(lambda _: self.plan_here())
-        self._judge(thorough=True)
 
-    def _moved_part(self, *, thorough: bool) -> None:
-        """Note that the part was moved; its margins follow when those of the last placement are done."""
-        self._thorough = thorough
-        self._moved.set()
-
-    def _follow_drags(self) -> None:
-        while not self._stopped.is_set():
-            self._moved.wait()
-            self._moved.clear()
-            if not self._stopped.is_set():
-                self._judge(thorough=self._thorough)
-
-    def _judge(self, *, thorough: bool) -> None:
-        """Show the margins of the present placement."""
-        with self._lock:
-            placement, study, tilted = self._scene.placement, self._study, self.panel.tilted.value
-        reach = study.at(placement, tilted=tilted, thorough=thorough)
-        with self._lock, self._server.atomic():
-            if study is not self._study:  # another run is shown meanwhile
-                return
-            self.reach = reach
-            self._scene.show_reach(self.reach)
-            self.panel.reach.content = reach_words(self.reach)
-            self.panel.place.content = place_words(placement)
-        self._show_machine_pose()
-
-    def _show_machine_pose(self) -> None:
-        """Show the machine at the slider's time."""
-        with self._lock:
-            seconds = self.panel.time.value
-            machine_pose = self._motion.machine_pose(seconds, self.run.machine, self._scene.placement)
-            self._scene.show_machine_pose(machine_pose)
-            self.panel.machine_pose.content = machine_pose_words(seconds, machine_pose)
-
-    def _play(self) -> None:
-        """Move the slider while "play" is ticked; after the end it starts again."""
-        last = time.perf_counter()
-        while not self._stopped.wait(FRAME_S):
-            now = time.perf_counter()
-            with self._lock:
-                if self.panel.play.value:
-                    later = self.panel.time.value + (now - last) * self.panel.speed_factor
-                    self.panel.time.value = later if later <= self._motion.duration else 0.0
-            last = now
-
-    def plan_here(self) -> None:
-        """Plan the job with the part at the present placement, into a folder of its own, and show the result."""
-        if not self._planning.acquire(blocking=False):
-            return
-        panel = self.panel
+def _server(access: Access, port: int) -> _Server:
+    """Return a server on the first free port. Raises InputError where there is none."""
+    for tried in range(port, min(port + PORTS, 65536)):
         try:
-            panel.replan.disabled, panel.bar.visible = True, True
-            self.replanned = done = replanned(self.run, self._scene.placement, self._show_progress)
-            if done.run is not None:
-                self._show(done.run)
-            self.panel.news.content = _result_words(done)
+            return _Server(access, tried)
+        except OSError as error:
+            if error.errno not in (errno.EADDRINUSE, errno.EACCES):
+                what = f"cannot listen there: {(error.strerror or str(error)).lower()}"
+                raise InputError(what, key="host", value=access.host, expected="an address of this machine") from error
+    raise InputError("no free port", key="port", value=port, remedy="name another with --port")
+
+
+class _Server(ThreadingHTTPServer):
+    """Has the runs by the first part of their paths."""
+
+    daemon_threads = True
+    allow_reuse_address = os.name != "nt"  # there it would share a port that is in use
+
+    def __init__(self, access: Access, port: int) -> None:
+        self.access = access
+        self.runs: dict[str, ServedRun] = {}
+        self._connections: set[socket] = set()
+        super().__init__((access.host, port), _Handler)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Keep the connection, to end it with the server."""
+        self._connections.add(request)
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """End a connection."""
+        self._connections.discard(request)
+        super().shutdown_request(request)
+
+    def server_close(self) -> None:
+        """End all connections: browsers keep them."""
+        super().server_close()
+        for connection in tuple(self._connections):
+            with suppress(OSError):
+                connection.shutdown(SHUT_RDWR)
+
+    def server_bind(self) -> None:
+        """Bind without asking for the name of the address, which may take long."""
+        TCPServer.server_bind(self)
+        self.server_name, self.server_port = str(self.server_address[0]), int(self.server_address[1])
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """Pages by GET, answers in JSON by POST."""
+
+    protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True
+    timeout = 600
+
+    @property
+    def _own(self) -> _Server:
+        return cast("_Server", self.server)
+
+    def do_GET(self) -> None:
+        """Send a page: of the only run, of both, or of one of them."""
+        if self._is_refused():
+            return
+        runs, name = self._own.runs, urlsplit(self.path).path.strip("/")
+        if not name and len(runs) > 1:
+            page = compare_page([run.viewed for run in runs.values()], self._own.access.token).encode()
+        elif (run := runs.get(name or "1")) is not None:
+            page = run.page
+        else:
+            self._send(HTTPStatus.NOT_FOUND, b"there is no such page\n")
+            return
+        self._send(HTTPStatus.OK, page, "text/html; charset=utf-8")
+
+    def do_POST(self) -> None:
+        """Answer what a page asks."""
+        length = self.headers.get("Content-Length", "")
+        if not length.isdecimal() or int(length) > MOST_BYTES:
+            self.close_connection = True
+            self._send(HTTPStatus.BAD_REQUEST, b"a request of this length is not answered\n")
+            return
+        body = self.rfile.read(int(length))
+        if self._is_refused():
+            return
+        number, _, name = urlsplit(self.path).path.strip("/").partition("/")
+        run, answer, status = self._own.runs.get(number), None, HTTPStatus.OK
+        try:
+            answer = None if run is None else run.answer(name, read_json(body))
         except PentapodError as error:
-            self.panel.news.content = str(error)
-        finally:
-            self.panel.replan.disabled, self.panel.bar.visible = False, False
-            self._planning.release()
+            answer, status = {"error": str(error)}, HTTPStatus.BAD_REQUEST
+        if answer is None:
+            answer, status = {"error": "there is no such answer"}, HTTPStatus.NOT_FOUND
+        self._send(status, json.dumps(answer, allow_nan=False, separators=(",", ":")).encode(), "application/json")
 
-    def _show_progress(self, stage: str, fraction: float, note: str = "") -> None:
-        """Show the progress of planning."""
-        self.panel.bar.value = 100.0 * fraction
-        self.panel.news.content = f"{stage} {note}".strip()
+    def _is_refused(self) -> bool:
+        """Whether a request may not be answered; that is sent."""
+        refused = self._own.access.refusal(self.path, self.headers)
+        if refused:
+            self.close_connection = True
+            self._send(HTTPStatus.FORBIDDEN, f"{refused}\n".encode())
+        return bool(refused)
 
+    def _send(self, status: HTTPStatus, body: bytes, kind: str = "text/plain; charset=utf-8") -> None:
+        self.send_response(status)
+        for name, value in {**HEADERS, "Content-Type": kind, "Content-Length": str(len(body))}.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(body)
 
-def _result_words(done: Replanned) -> str:
-    """Return the result of planning again, as text."""
-    refusal = done.outcome.refusal
-    if refusal is not None:
-        return f"**Refused**: {refusal}"
-    answer = f"Verdict: {done.outcome.verdict.answer}"
-    answer = answer if done.outcome.passed else f"**{answer}**"
-    where = "the job file" if done.outcome.find(Piece) is None else "a copy of the job file, for this set-up alone"
-    return f"{answer}. Files: `{done.folder}`. For {where}:\n```toml\n{done.table}\n```"
+    def log_message(self, format: str, *args: object) -> None:
+        """Say nothing of requests: their addresses have the token."""

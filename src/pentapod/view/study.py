@@ -1,4 +1,4 @@
-"""Study: margins along the path for any placement of the part, quickly, and their colours."""
+"""Study: margins along the path for any placement of the part, quickly."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.values import Value
@@ -19,24 +18,18 @@ from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.view.opened_run import OpenedRun
 
 COMFORTABLE = 0.4
-"""Smallest margin from which a waypoint is drawn in full green."""
-
-COLOUR_STOPS = np.array([0.0, 0.35, 1.0])
-"""Margins of the colours, as shares of `COMFORTABLE`."""
-
-COLOURS = np.array([[214.0, 58.0, 40.0], [240.0, 184.0, 48.0], [26.0, 152.0, 80.0]])
-BEYOND_COLOUR = np.array([128.0, 0.0, 32.0])
-"""Of waypoints beyond a limit: darker than all others, to be told apart without colour."""
+"""Smallest margin from which a waypoint has the best colour."""
 
 
 @dataclass(frozen=True)
 class StudyOptions:
-    """Numbers of waypoints. shown: drawn, and judged while the part is dragged. thorough: judged after a drag.
+    """Numbers of waypoints. shown: drawn. dragged: judged while the part is dragged; thorough: after a drag.
 
     tilted: judged with the best tool axis while the part is dragged.
     """
 
     shown: int = 2500
+    dragged: int = 1500
     thorough: int = 20_000
     tilted: int = 400
 
@@ -71,10 +64,6 @@ class Reach(Value):
         """Whether every limit is kept at all rows."""
         return self.worst.margin >= 0.0
 
-    def colours(self, at: Ints) -> NDArray[np.uint8]:
-        """Return the colours (m, 3) of waypoints `at`, by linear interpolation of the margins."""
-        return margin_colours(np.interp(at, self.rows, self.margins))
-
 
 @dataclass(frozen=True, eq=False)
 class Study(Value):
@@ -98,14 +87,14 @@ class Study(Value):
         return cls(samples, run.axes, margins, drawn_waypoints(run.toolpath.starts))
 
     def at(self, placement: RigidTransform, *, tilted: bool = False, thorough: bool = False) -> Reach:
-        """Return the margins of a placement, at the waypoints that are drawn.
+        """Return the margins of a placement, at some of the waypoints that are drawn.
 
         tilted: with the best tool axis within the job's cone at each waypoint instead of the planned ones, at fewer
         waypoints. thorough: at many more waypoints.
         """
-        rows = self._thorough_rows if thorough else self.shown
+        rows = self._thorough_rows if thorough else _some(self.shown, OPTIONS.dragged)
         if tilted:
-            rows = rows[:: -(-len(rows) // OPTIONS.tilted)] if not thorough else self.shown
+            rows = self.shown if thorough else _some(self.shown, OPTIONS.tilted)
             values, _ = best_tilted_margins(self.samples.at(rows), self.margins, placement)
         else:
             values = self.margins(*self.samples.machine_poses(placement, self.axes[rows], rows), placement)
@@ -122,16 +111,14 @@ class Study(Value):
         return np.unique(np.linspace(0, count - 1, min(count, OPTIONS.thorough)).astype(np.intp))
 
 
-def margin_colours(margins: Floats) -> NDArray[np.uint8]:
-    """Return RGB colours (n, 3) of margins (n,): red at a limit to green at `COMFORTABLE`; dark red beyond a limit."""
-    share = np.clip(margins / COMFORTABLE, 0.0, 1.0)
-    within = np.stack([np.interp(share, COLOUR_STOPS, column) for column in COLOURS.T], axis=1)
-    return np.where((margins < 0.0)[:, None], BEYOND_COLOUR, within).astype(np.uint8)
-
-
 def drawn_waypoints(starts: Ints) -> Ints:
     """Return the waypoints to draw: evenly spaced ones, and ends of segments."""
     count = int(starts[-1]) + 1
     even = np.linspace(0, count - 1, min(count, OPTIONS.shown)).astype(np.intp)
     ends = starts[:: -(-len(starts) // (OPTIONS.shown // 2))]
     return np.unique(np.concatenate([even, ends, [count - 1]])).astype(np.intp)
+
+
+def _some(rows: Ints, most: int) -> Ints:
+    """Return evenly chosen ones, at most so many, and the last."""
+    return np.unique(np.append(rows[:: -(-len(rows) // most)], rows[-1]))

@@ -15,6 +15,7 @@ from pentapod.cli.progress import progress_bar
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@click.argument("other", type=click.Path(path_type=Path), metavar="[DIR2]", required=False)
 @click.option("--job", type=click.Path(path_type=Path), help="The job file of the run, if it was moved.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0 for all.")
 @click.option("--port", type=Whole(1, 65535), default=8080, show_default=True,
@@ -22,20 +23,23 @@ from pentapod.cli.progress import progress_bar
 @click.option("--open/--no-open", "opens", default=True, help="Open a browser.")
 @json_option
 @quiet_option
-def view(folder: Path, job: Path | None, host: str, port: int, opens: bool, as_json: bool, quiet: bool) -> int:
+def view(
+    folder: Path, other: Path | None, job: Path | None, host: str, port: int, opens: bool, as_json: bool, quiet: bool
+) -> int:
     """Show the run in DIR live in a browser: machine, part and path. Ctrl-C ends.
 
-    Play the program; drag the part and see the margins of its new placement along the path, green to red; plan again
-    with the part there (into DIR/replanned). Needs the extra "view". --json prints the address. Only requests with
-    the token in the address are answered.
+    Play the program; drag the part, or type where it is, and see the margins there along the path; plan again with the
+    part there (into DIR/replanned). With DIR2, two runs are shown side by side. --json prints the address. Only
+    requests with the token in the address are answered.
     """
     from pentapod.view import Viewer, open_run
-    from pentapod.view.access import load_viser
 
-    load_viser()  # fails at once where it is not installed
     with progress_bar(quiet=quiet or as_json) as progress:
         run = open_run(folder, job, progress)
-    with Viewer(run, host=host, port=port) as viewer:
+        second = None if other is None else open_run(other, None, progress)
+        progress("page", 0.0)
+        viewer = Viewer(run, second, host=host, port=port)
+    with viewer:
         try:
             if as_json:
                 echo_json({"url": viewer.url})

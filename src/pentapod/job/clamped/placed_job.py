@@ -27,7 +27,11 @@ def read_placement(path: str | Path) -> RigidTransform:
     Raises InputError with file, line and key, also where its mode is not "fixed".
     """
     file = Path(path)
-    text = read_toml(file, "placement", InputError, start='"pentapod register" writes one')
+    return placement_in(read_toml(file, "placement", InputError, start='"pentapod register" writes one'), file)
+
+
+def placement_in(text: str, file: Path) -> RigidTransform:
+    """Return the placement in the text of such a file. Raises InputError, as `read_placement` does."""
     content = parsed(text, file, InputError)
     table = content.get("placement")
     if not isinstance(table, Mapping):

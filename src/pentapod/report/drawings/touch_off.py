@@ -67,6 +67,20 @@ def touch_off_table(points: list[TouchOff]) -> str:
     )
 
 
+def touch_off_text(points: list[TouchOff]) -> str:
+    """Return the points as a CSV file, mm: one line each, leg 1 first."""
+    legs = len(points[0].legs) if points else 0
+    names = [f"{what}_{axis}" for what in ("mesh", "machine", "tip", "axis") for axis in "xyz"]
+    lines = [",".join(["point", "waypoint", *names, *(f"leg_{leg + 1}" for leg in range(legs))])]
+    for number, point in enumerate(points, start=1):
+        places = [from_si(value, "mm") for value in (point.on_part, point.in_machine, point.tip)]
+        values = np.concatenate([*places, point.axis, from_si(point.legs, "mm")])
+        lines.append(
+            ",".join([f"{number}", f"{point.waypoint}", *(f"{round(v, 6) + 0.0:.6f}" for v in values.tolist())])
+        )
+    return "\n".join(lines) + "\n"
+
+
 def _row(number: int, point: TouchOff) -> str:
     cells = [
         str(number), *(_numbers(from_si(value, "mm"), 2) for value in (point.on_part, point.in_machine, point.tip)),

@@ -44,6 +44,39 @@ OPTIONS = KeyOptions()
 
 
 @dataclass(frozen=True, eq=False)
+class Moments:
+    """What the page knows of the machine at each of its keys (K), SI units, machine frame.
+
+    beside (B,): legs whose joints are not on the tool axis; joints (K, B, 3). nearest: the limits of the margins.
+    kinds: of the segments, indices into `SEGMENT_KINDS`.
+    """
+
+    times: Floats
+    tips: Floats
+    axes: Floats
+    beside: Ints
+    joints: Floats
+    margins: Floats
+    nearest: Ints
+    causes: Ints
+    segments: Ints
+    kinds: Ints
+
+    def pack(self, packed: Packed, period: float) -> None:
+        """Add the arrays; period: step of the times, s."""
+        packed.numbers("key.time", self.times, period)
+        packed.numbers("key.tip", 1e3 * self.tips, OPTIONS.step_mm)
+        packed.numbers("key.axis", self.axes, OPTIONS.axis_step)
+        if len(self.beside):
+            packed.numbers("key.joints", 1e3 * self.joints.reshape(len(self.times), -1), OPTIONS.step_mm)
+        packed.numbers("key.margin", self.margins)
+        packed.whole("key.nearest", self.nearest)
+        packed.whole("key.cause", self.causes)
+        packed.whole("key.segment", self.segments)
+        packed.whole("key.kind", self.kinds)
+
+
+@dataclass(frozen=True, eq=False)
 class Keys:
     """Rows (K,) of a program, and what is shown of each.
 
@@ -65,8 +98,7 @@ class Keys:
     def of(cls, signals: Signals, machine: Machine, placed: PlacedPath, tolerance: float) -> Keys:
         """Return the keys of a program. tolerance: of the program against the path, metres."""
         tips, axes = signals.tips, signals.axes
-        beside = joints_beside(machine, tips[0], axes[0])
-        joints = leg_ends(machine, tips, axes)[1][:, beside] if len(beside) else np.zeros((len(tips), 0, 3))
+        beside, joints = joints_of(machine, tips, axes)
         far = 1e3 * (machine.tool_length - machine.line_top)
         shown = np.concatenate([1e3 * tips, far * axes, 1e3 * joints.reshape(len(tips), -1)], axis=1)
         must = _marked(signals)
@@ -84,21 +116,15 @@ class Keys:
 
     def pack(self, packed: Packed, signals: Signals, kinds: Sequence[SegmentKind], period: float) -> None:
         """Add the arrays of the motion. kinds: of the toolpath's segments; period: of the controller, s."""
-        rows, causes = self.rows, signals.causes[self.rows]
-        packed.numbers("key.time", signals.times[rows], period)
-        packed.numbers("key.tip", 1e3 * signals.tips[rows], OPTIONS.step_mm)
-        packed.numbers("key.axis", signals.axes[rows], OPTIONS.axis_step)
-        if len(self.beside):
-            packed.numbers("key.joints", 1e3 * self.joints.reshape(len(rows), -1), OPTIONS.step_mm)
-        packed.numbers("key.margin", self.margins)
+        rows = self.rows
+        order, segments = np.array([SEGMENT_KINDS.index(kind) for kind in kinds]), signals.segments[rows]
+        Moments(
+            signals.times[rows], signals.tips[rows], signals.axes[rows], self.beside, self.joints, self.margins,
+            self.nearest, signals.causes[rows], segments, order[segments],
+        ).pack(packed, period)  # fmt: skip
         packed.numbers("key.share", 100.0 * self.shares, 0.1)
         packed.numbers("key.deviation", 1e3 * self.deviations)
         packed.numbers("key.force", self.forces)
-        packed.whole("key.nearest", self.nearest)
-        packed.whole("key.cause", causes)
-        packed.whole("key.segment", signals.segments[rows])
-        order = np.array([SEGMENT_KINDS.index(kind) for kind in kinds])
-        packed.whole("key.kind", order[signals.segments[rows]])
 
     def scales(self, tolerance: float) -> list[dict[str, Any]]:
         """Return by what the path can be coloured: name, array, unit, the worst and the best value, words at both ends.
@@ -107,7 +133,7 @@ class Keys:
         """
         strongest, weakest = float(np.nanmax(self.forces)), float(np.nanmin(self.forces))
         return [
-            _scale("smallest margin", "key.margin", "", 0.0, 0.5, ("0, at a limit", "0.25", "0.5 or more")),
+            MARGIN_SCALE,
             _scale("share of the feed", "key.share", " %", 0.0, 100.0, ("0 %", "50 %", "100 % of the feed")),
             _scale("what limits the motion", "key.cause", "", 0.0, 1.0, ()),
             _scale(
@@ -123,6 +149,16 @@ class Keys:
 
 def _scale(name: str, array: str, unit: str, worst: float, best: float, ends: tuple[str, ...]) -> dict[str, Any]:
     return {"name": name, "array": array, "unit": unit, "worst": worst, "best": best, "ends": ends}
+
+
+MARGIN_SCALE = _scale("smallest margin", "key.margin", "", 0.0, 0.5, ("0, at a limit", "0.25", "0.5 or more"))
+
+
+def joints_of(machine: Machine, tips: Floats, axes: Floats) -> tuple[Ints, Floats]:
+    """Return which legs (B,) end beside the tool axis of the poses (N, 3), and their joints (N, B, 3)."""
+    beside = joints_beside(machine, tips[0], axes[0])
+    joints = leg_ends(machine, tips, axes)[1][:, beside] if len(beside) else np.zeros((len(tips), 0, 3))
+    return beside, joints
 
 
 def joints_beside(machine: Machine, tip: Floats, axis: Floats) -> Ints:

@@ -30,7 +30,7 @@ from pentapod.report.page.plots import bucket_words, plots_of
 from pentapod.report.page.preparations import facts, preparations, provenance
 from pentapod.report.page.scene import scene_of
 from pentapod.report.setup_sheet import margins_along_path, setup_drawings, setup_sheet
-from pentapod.report.signals import Signals
+from pentapod.report.signals import Signals, TimeLaw
 from pentapod.report.template import write_page
 from pentapod.report.worst import worst_places
 from pentapod.timing.explain import Explanation
@@ -39,24 +39,37 @@ from pentapod.toolpath.linking.partition import Piece
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
 
+TEMPLATE = "page.html.j2"
+
 
 def write_report(outcome: Outcome, path: str | Path) -> Path:
     """Write report.html on a run and return its path. Raises InputError where it cannot be written."""
-    run, packed = _Run(outcome), Packed()
+    page, packed, context = contents(ReportedRun(outcome))
+    return write_page(path, TEMPLATE, page, packed, **context)
+
+
+def contents(run: ReportedRun) -> tuple[dict[str, Any], Packed, dict[str, Any]]:
+    """Return what the page's script draws, the arrays for it, and the variables of the template."""
+    packed = Packed()
     motion = run.motion(packed)
     page = {
-        "scene": scene_of(packed, outcome, run.signals, run.machine),
+        "scene": scene_of(packed, run.outcome, run.signals, run.machine),
         "motion": motion,
         "plots": None if run.signals is None else plots_of(packed, run.signals, run.machine),
     }
-    return write_page(path, "page.html.j2", page, packed, **_context(run, motion))
+    return page, packed, _context(run, motion)
 
 
 @dataclass(frozen=True, eq=False)
-class _Run:
+class ReportedRun:
     """A run, and what is computed from it once."""
 
     outcome: Outcome
+
+    @property
+    def law(self) -> TimeLaw | None:
+        """Its time law."""
+        return self.outcome.find(Trajectory)
 
     @cached_property
     def machine(self) -> Machine:
@@ -68,11 +81,11 @@ class _Run:
     def signals(self) -> Signals | None:
         """The motion of the program, if there is one."""
         find = self.outcome.find
-        program, trajectory, toolpath = find(Program), find(Trajectory), find(Toolpath)
-        if program is None or trajectory is None or toolpath is None:
+        program, law, toolpath = find(Program), self.law, find(Toolpath)
+        if program is None or law is None or toolpath is None:
             return None
         world, limits = self._collision_world, placement_limits(self.outcome.job)
-        return Signals.of(program, self.machine, trajectory, toolpath, world, limits)
+        return Signals.of(program, self.machine, law, toolpath, world, limits)
 
     @property
     def _collision_world(self) -> CollisionWorld:
@@ -95,14 +108,20 @@ class _Run:
         name = signals.margin_names[int(signals.margins[row].argmin())]
         return float(signals.smallest_margins[row]), name, float(signals.times[signals.margin_rows[row]])
 
+    @cached_property
+    def keys(self) -> Keys | None:
+        """The keys of the motion; None without a program."""
+        placed = self.outcome.find(PlacedPath)
+        if self.signals is None or placed is None:
+            return None
+        return Keys.of(self.signals, self.machine, placed, self.outcome.job.tolerance.si.path)
+
     def motion(self, packed: Packed) -> dict[str, Any] | None:
         """Add the arrays of the motion to the page's and return the rest; None without a program."""
-        signals, find = self.signals, self.outcome.find
-        placed, toolpath, program = find(PlacedPath), find(Toolpath), find(Program)
-        if signals is None or placed is None or toolpath is None or program is None:
+        signals, keys, find = self.signals, self.keys, self.outcome.find
+        toolpath, program = find(Toolpath), find(Program)
+        if signals is None or keys is None or toolpath is None or program is None:
             return None
-        tolerance = self.outcome.job.tolerance.si.path
-        keys = Keys.of(signals, self.machine, placed, tolerance)
         keys.pack(packed, signals, [segment.kind for segment in toolpath.segments], program.period)
         return {
             "start": self.least[2],
@@ -119,11 +138,11 @@ class _Run:
             ],
             "kind_names": [kind.value for kind in SEGMENT_KINDS],
             "margins": signals.margin_names,
-            "scales": keys.scales(tolerance),
+            "scales": keys.scales(self.outcome.job.tolerance.si.path),
         }
 
 
-def _context(run: _Run, motion: dict[str, Any] | None) -> dict[str, Any]:
+def _context(run: ReportedRun, motion: dict[str, Any] | None) -> dict[str, Any]:
     """Return the variables of the template."""
     outcome, signals = run.outcome, run.signals
     placed, program, verdict = outcome.find(PlacedPath), outcome.find(Program), outcome.verdict
@@ -165,6 +184,7 @@ def _context(run: _Run, motion: dict[str, Any] | None) -> dict[str, Any]:
         ),
         "stages": outcome.stages,
         "moves": signals is not None,
+        "plays": motion is not None,
         "buckets": "" if signals is None else bucket_words(signals),
         "provenance": provenance(outcome),
     }

@@ -70,7 +70,8 @@ def scene_of(packed: Packed, outcome: Outcome, signals: Signals | None, machine:
         if (held := held_mesh(outcome, placed)) is not None:
             vertices, faces = thinned_mesh(held.vertices, held.faces, DETAIL.facets)
             packed.mesh("held", 1e3 * vertices, faces)
-            scene["meshes"].append(_mesh("held", held.name, HELD_COLOUR, 0.55))
+            moves = outcome.job.fixture.frame != "machine"
+            scene["meshes"].append(_mesh("held", held.name, HELD_COLOUR, 0.55) | {"moves": moves})
         if signals is None:
             worst = int(placed.margins.min(axis=1).argmin())
             tip, axis = placed.tips[worst], placed.axes[worst]
@@ -150,12 +151,14 @@ def _part(packed: Packed, mesh: Mesh, transform: RigidTransform) -> dict[str, An
         most = min(most, len(faces)) // 2
     packed.mesh("part", 1e3 * vertices, faces)
     matrix = [*transform.rotation.ravel().tolist(), *(1e3 * transform.translation).tolist()]
-    return {**_mesh("part", "part", PART_COLOUR, 1.0), "matrix": matrix, "isPart": True}
+    return {**_mesh("part", "part", PART_COLOUR, 1.0), "matrix": matrix, "isPart": True, "moves": True}
 
 
 def _mesh(array: str, name: str, colour: str, opacity: float) -> dict[str, Any]:
+    """Return a mesh. moves: with the part, when that is dragged."""
     arrays = {"vertices": f"{array}.vertices", "faces": f"{array}.faces"}
-    return {"name": name, "colour": colour, "opacity": opacity, "matrix": None, "isPart": False, **arrays}
+    still = {"matrix": None, "isPart": False, "moves": False}
+    return {"name": name, "colour": colour, "opacity": opacity, **still, **arrays}
 
 
 def _table(outcome: Outcome, mesh: Mesh | None, transform: RigidTransform) -> dict[str, Any] | None:

@@ -85,6 +85,11 @@ export class Machine extends Group {
     });
   }
 
+  /** Show which legs are beyond their strokes. */
+  mark(areBeyond, ink) {
+    this.legs.forEach(({ leg }, k) => leg.children[0].material.color.set(areBeyond[k] ? ink : this.data.legs[k].colour));
+  }
+
   /** Points that hold the base and the platform where it is, for the views. */
   get bounds() {
     const { rim } = this.data, away = new Vector3(...rim.normal).normalize(), side = new Vector3(1, 0, 0).projectOnPlane(away).normalize();

@@ -1,4 +1,6 @@
 // The page's script: scene and plots follow one clock, which slider, links, clicks and keys move.
+import { compare } from "./compare.js";
+import { Live } from "./live.js";
 import { Clock, Motion } from "./motion.js";
 import { Plots } from "./plots.js";
 import { legend, scaleOf, Told } from "./readout.js";
@@ -16,13 +18,15 @@ async function begin() {
   const started = performance.now(), page = JSON.parse($("page").textContent);
   const arrays = await Arrays.of($("arrays").textContent, page.arrays);
   const motion = page.motion ? new Motion(page.motion, arrays) : null, clock = new Clock(motion?.duration ?? 0);
-  const view = page.scene ? viewOf(page.scene, arrays, motion) : null;
-  Object.assign(window, { report: { page, arrays, motion, clock, view } }); // for the console, and for tests
+  if (page.compare) return compare();
+  const view = page.scene ? viewOf(page.scene, arrays, motion) : null, live = page.live ? new Live(page, arrays, view, motion, clock) : null;
+  Object.assign(window, { report: { page, arrays, motion, clock, view, live } }); // for the console, and for tests
   if (page.scene) onScene(page, view);
-  if (motion) onMotion(page, motion, clock, view);
+  if (motion) onMotion(page, motion, clock, view, live);
   if (motion) clock.set(page.motion.start);
   view?.look("machine");
   view?.draw();
+  document.documentElement.dataset.pictured = Math.round(performance.now()); // since the address was opened
   document.documentElement.dataset.drawn = Math.round(performance.now() - started);
   await new Promise((later) => { setTimeout(later); }); // the picture first
   const plots = page.plots ? new Plots($("plots"), page.plots, arrays, motion && ((time) => clock.go(time))) : null;
@@ -72,17 +76,19 @@ function onScene(page, view) {
   });
 }
 
-function onMotion(page, motion, clock, view) {
+function onMotion(page, motion, clock, view, live) {
   const slider = $("slider"), told = new Told($("told"), page.motion, motion);
   slider.max = motion.duration;
   let frames = 0;
   clock.listeners.push((now) => {
-    const state = motion.at(now), legs = view?.pose(state.tip, state.axis, state.joints);
+    const state = motion.at(now), legs = view?.pose(state.tip, state.axis, state.joints, motion.areThere);
+    live?.mark(legs);
     slider.value = now;
     $("clock").textContent = `${now.toFixed(2)} s`;
     if (!clock.isRunning || frames++ % 6 === 0) slider.setAttribute("aria-valuetext", told.show(state, legs)); // words less often than pictures
   });
   const paint = () => {
+    if (live?.paint($("colour").value, $("legend"))) return;
     const scale = page.motion.scales.find(({ array }) => array === $("colour").value);
     view?.paint(scaleOf(scale, page.motion, motion));
     $("legend").replaceChildren(...legend(scale, page.motion));

@@ -7,6 +7,7 @@ export class Motion {
     this.tips = arrays.rows("key.tip");
     this.axes = arrays.rows("key.axis");
     this.joints = "key.joints" in arrays.directory ? arrays.rows("key.joints") : new Float32Array();
+    this.areThere = false; // are the joints where the part is now, not where it was planned?
     this.kinds = arrays.whole("key.kind");
     this.segments = arrays.whole("key.segment");
     this.causes = arrays.whole("key.cause");

@@ -1,5 +1,5 @@
 // The scene: machine, part, fixture, table and path; drawn when something changed, looked at from where one asks.
-import { AmbientLight, DirectionalLight, HemisphereLight, Matrix4, PerspectiveCamera, Raycaster, Scene, Vector2, Vector3, WebGLRenderer } from "three";
+import { AmbientLight, DirectionalLight, Group, HemisphereLight, Matrix4, PerspectiveCamera, Raycaster, Scene, Vector2, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Machine, plate } from "./machine.js";
 import { dots, Path, polylines } from "./path.js";
@@ -23,7 +23,9 @@ export class View {
     this.controls.addEventListener("change", () => this.ask());
     this.caster = new Raycaster();
     this.named = new Map(); // what the legend can hide
-    this.onDraw = [];
+    this.part = new Group(); // what moves with the part
+    this.part.matrixAutoUpdate = false;
+    this.scene.add(this.part);
     this._light();
     this._fill(data, arrays, keys);
   }
@@ -47,7 +49,7 @@ export class View {
         const [a, b, c, d, e, f, g, h, i, x, y, z] = mesh.matrix;
         body.applyMatrix4(new Matrix4().set(a, b, c, x, d, e, f, y, g, h, i, z, 0, 0, 0, 1));
       }
-      this._add(mesh.name, body);
+      this._add(mesh.name, body, true, mesh.moves);
       if (mesh.isPart) this.partPoints.push(...corners(body));
       return body;
     });
@@ -56,30 +58,45 @@ export class View {
       this.machine = new Machine({ ...data.machine, up: this.up });
       this.scene.add(this.machine);
     }
-    if (keys) this.scene.add((this.path = new Path(keys)));
-    for (const line of data.lines) this._add(line.name, polylines(arrays.rows(line.points), arrays.whole(line.runs), line.colour, line.width), line.shown);
-    for (const group of data.dots) this._add(group.name, dots(arrays.rows(group.points), group.colour), group.shown);
+    if (keys) this.part.add((this.path = new Path(keys)));
+    for (const line of data.lines) this._add(line.name, polylines(arrays.rows(line.points), arrays.whole(line.runs), line.colour, line.width), line.shown, true);
+    for (const group of data.dots) this._add(group.name, dots(arrays.rows(group.points), group.colour), group.shown, true);
     if (!this.partPoints.length) for (const body of this.named.values()) this.partPoints.push(...corners(body));
     if (!this.partPoints.length && keys) for (let k = 0; k < keys.tips.length; k += 3) this.partPoints.push(new Vector3(...keys.tips.subarray(k, k + 3)));
     if (data.pose && this.machine) this.machine.pose(data.pose.tip, data.pose.axis, data.pose.joints);
   }
 
-  _add(name, body, isShown = true) {
+  _add(name, body, isShown = true, moves = false) {
     body.visible = isShown;
-    this.scene.add(body);
+    (moves ? this.part : this.scene).add(body);
     this.named.set(name, body);
   }
 
   show(name, isShown) { this.named.get(name).visible = isShown; this.ask(); }
 
-  pose(tip, axis, joints) { this.ask(); return this.machine?.pose(tip, axis, joints) ?? []; }
+  /** Put the machine at a pose of the plan, moved with the part; joints: also moved, but where they were computed there. */
+  pose(tip, axis, joints, areThere = false) {
+    this.ask();
+    const { matrix } = this.part, at = (point) => new Vector3(...point).applyMatrix4(matrix).toArray();
+    const along = new Vector3(...axis).transformDirection(matrix).toArray(), ends = [];
+    for (let k = 0; k < (joints?.length ?? 0); k += 3) ends.push(...(areThere ? joints.slice(k, k + 3) : at(joints.slice(k, k + 3))));
+    return this.machine?.pose(at(tip), along, ends) ?? [];
+  }
+
+  /** Move the part, and what is on it, from where it was planned. */
+  movePart(matrix) {
+    this.part.matrix.copy(matrix);
+    this.part.matrixWorldNeedsUpdate = true;
+    this.ask();
+  }
 
   paint(colours) { this.path?.paint(colours); this.ask(); }
 
   /** Look from one of `VIEWS`, as near as all of it fits into the picture. */
   look(name) {
     const [right, front, above] = VIEWS[name], isWhole = this.machine && name !== "part" && name !== "above";
-    const points = isWhole ? [...this.partPoints, ...this.machine.bounds] : this.partPoints;
+    const own = this.partPoints.map((point) => point.clone().applyMatrix4(this.part.matrix));
+    const points = isWhole ? [...own, ...this.machine.bounds] : own;
     const back = new Vector3(right, -this.up * front, this.up * above).normalize();
     const across = new Vector3().crossVectors(this.camera.up, back).normalize(), high = new Vector3().crossVectors(back, across);
     const tall = Math.tan((this.camera.fov * Math.PI) / 360) / ROOM, wide = tall * this.camera.aspect;
