@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import os
 import re
-import shutil
 import sys
 from pathlib import Path
 
 import pytest
 
+from browsers import CHROMIUM, needs_chromium
 from pentapod.cli.commands.new import dome_stl
 from pentapod.job import Job, run
 from pentapod.report import write_report, write_simulation
@@ -21,7 +20,6 @@ from usual_job import job_text
 sys.path.append(str(Path(__file__).parents[1] / "program"))
 from short_motion import motion, placed
 
-CHROMIUM = os.environ.get("PENTAPOD_CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
 PAGES = ("report", "simulation")
 
 
@@ -56,7 +54,7 @@ def test_the_policy_allows_this_script_and_no_request(name, pages):
     assert text.count("<script>") == 1
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium; PENTAPOD_CHROMIUM may name one")
+@needs_chromium
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("name", PAGES)
 def test_a_browser_is_asked_for_nothing(name, pages):

@@ -8,26 +8,18 @@ from __future__ import annotations
 import io
 import os
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from browsers import CHROMIUM, IN_A_BROWSER, PATIENCE_MS
 from pentapod.job import Job, run
 from pentapod.program import Program
 from pentapod.report import write_report
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-CHROMIUM = os.environ.get("PENTAPOD_CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
-pytestmark = [
-    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium; PENTAPOD_CHROMIUM may name one"),
-    # What playwright leaves to the garbage collector is no fault of the page.
-    pytest.mark.filterwarnings("ignore::ResourceWarning"),
-    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
-]
-
-PATIENCE_MS = 240_000  # a busy machine without a GPU is no failure
+pytestmark = IN_A_BROWSER
 
 CONTRAST = """() => {
   const parse = (text) => {

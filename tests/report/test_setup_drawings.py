@@ -15,7 +15,8 @@ from pentapod.job.build.tool import job_tool
 from pentapod.job.build.values import job_mesh
 from pentapod.machine import Machine
 from pentapod.report.drawings.planned_run import PlannedRun
-from pentapod.report.drawings.views import all_drawings, machine_drawings, setup_drawings
+from pentapod.report.drawings.touch_off import touch_off_points
+from pentapod.report.drawings.views import machine_drawings, setup_drawings
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 MACHINES = ("desk", "steep", "guide", "bench-general", "hexa", "spr", "prpu")
@@ -80,7 +81,7 @@ def check_labels(text: str) -> None:
 @pytest.mark.parametrize("name", MACHINES)
 def test_setup_is_drawn_on_every_family_with_labels_apart(standing, name):
     run = standing(name, (12.0, -31.0, 3.0), 25.0, 7.0)
-    text = all_drawings(run)
+    text = setup_drawings(run, touch_off_points(run))
     assert len(drawings(text)) == 4
     check_labels(text)
     above = drawings(text)[0]
@@ -97,13 +98,14 @@ def test_setup_is_drawn_on_every_family_with_labels_apart(standing, name):
 @pytest.mark.parametrize("shift", [(0, 0, 0), (150, 80, -40), (-85.0, 17.0, 0.0)])
 def test_setup_labels_are_apart_wherever_the_part_is(standing, shift, tilt):
     for turn in (0.0, 90.0, -137.0):
-        check_labels(all_drawings(standing("desk", shift, turn, tilt)))
+        run = standing("desk", shift, turn, tilt)
+        check_labels(setup_drawings(run, touch_off_points(run)))
 
 
 def test_setup_dimensions_are_those_of_the_part_and_its_place(standing):
     run = standing("desk", (20.0, 10.0, 5.0), 30.0)
     found = [{kind: [] for kind in ("dimension", "coordinate")} for _ in range(4)]
-    for drawing, told in zip(drawings(all_drawings(run)), found, strict=True):
+    for drawing, told in zip(drawings(setup_drawings(run, touch_off_points(run))), found, strict=True):
         for kind, *_, text in TEXT.findall(drawing):
             if kind in told:
                 told[kind].append(text.replace("−", "-"))
@@ -126,7 +128,7 @@ def test_setup_dimensions_are_those_of_the_part_and_its_place(standing):
 def test_setup_of_a_tilted_part_shows_the_wedge_in_its_true_size(standing):
     run = standing("desk", (0.0, 0.0, 0.0), 40.0, 12.0)
     assert np.degrees(run.stand.lean) == pytest.approx(12.0)
-    side = drawings(all_drawings(run))[3]
+    side = drawings(setup_drawings(run, touch_off_points(run)))[3]
     assert [t[-1] for t in TEXT.findall(side) if t[0] == "angle"] == ["12.00°"]
     # The lowest point of the part is where it leans to: on the right of the drawing.
     lowest = run.vertices[run.vertices[:, 2].argmax()] - run.vertices.mean(axis=0)
@@ -142,7 +144,7 @@ def test_setup_on_a_table_draws_the_table(standing):
     head = ('mode = "fixed"', f'mode = "table"\ntable_z_mm = {centre + 5.0:.3f}')
     gone = [(line, "") for line in ('component = "++"',)]
     run = standing("desk", (0, 0, 5.0), 0.0, 0.0, head, ("position_mm", "#"), ("rotation_deg", "#"), *gone)
-    assert f"table z {centre + 5.0:.2f}" in drawings(setup_drawings(run))[1]
+    assert f"table z {centre + 5.0:.2f}" in drawings(setup_drawings(run, touch_off_points(run)))[1]
     assert run.table == pytest.approx(run.lowest, abs=1e-6)
 
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 from pathlib import Path
 
 import pytest
 
+from browsers import CHROMIUM, IN_A_BROWSER, PATIENCE_MS
 from pentapod.cli.commands.new import dome_stl
 from pentapod.job import Job, run
 from pentapod.report.drawings.planned_run import PlannedRun
@@ -19,15 +19,7 @@ from pentapod.report.sheet.page import SheetPage, write_pages
 from usual_job import job_text
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-CHROMIUM = os.environ.get("PENTAPOD_CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
-pytestmark = [
-    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium; PENTAPOD_CHROMIUM may name one"),
-    # What playwright leaves to the garbage collector is no fault of the page.
-    pytest.mark.filterwarnings("ignore::ResourceWarning"),
-    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
-]
-
-PATIENCE_MS = 240_000  # a busy machine without a GPU is no failure
+pytestmark = IN_A_BROWSER
 
 OVERLAPS = """() => [...document.querySelectorAll("figure svg")].flatMap((svg) => {
   const frame = svg.getBoundingClientRect();

@@ -15,21 +15,14 @@ import numpy as np
 import pytest
 from asked import shifted
 
+from browsers import CHROMIUM, IN_A_BROWSER, PATIENCE_MS
 from pentapod.job import Job, run
 from pentapod.job.build.placement import job_at, placement_toml
 from pentapod.view import Study, Viewer, open_run
 from pentapod.view.viewed import placement_of
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-CHROMIUM = os.environ.get("PENTAPOD_CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
-pytestmark = [
-    pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium; PENTAPOD_CHROMIUM may name one"),
-    # What playwright leaves to the garbage collector is no fault of the page.
-    pytest.mark.filterwarnings("ignore::ResourceWarning"),
-    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
-]
-
-PATIENCE_MS = 240_000  # a busy machine without a GPU is no failure
+pytestmark = IN_A_BROWSER
 DEMO = Path(__file__).parents[2] / "toolpaths" / "dome.toml"
 HERE = "window.report.live.placement"
 LEGS = "() => window.report.view.machine.legs.map((leg) => leg.leg.position.distanceTo(leg.joint.position))"

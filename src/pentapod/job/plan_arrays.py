@@ -21,7 +21,7 @@ from pentapod.planning.leg_path.leg_path import LegPath
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.program.program import Program
 from pentapod.timing.time_law.motion_law import MotionLaw
-from pentapod.timing.time_law.trajectory import Trajectory
+from pentapod.timing.time_law.trajectory import Profile, Trajectory
 from pentapod.toolpath.formats.npz import toolpath_arrays
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.toolpath.toolpath import Toolpath
@@ -44,11 +44,32 @@ LAW_NAMES = (
 )
 """Knots of each motion law, and the values of all laws, one after the other; accelerations and jerks between knots."""
 
+PIECE_STARTS = "trajectory.piece_starts_s"
+
+PROFILE_FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
+    "trajectory.time_s": ("f", (None,)),
+    "trajectory.station_mm": ("f", (None,)),
+    "trajectory.speed_mm_s": ("f", (None,)),
+    "trajectory.active": ("iu", (None,)),
+    "trajectory.shares": ("f", (None,)),
+    "trajectory.constraint_names": ("U", (None,)),
+}
+"""Arrays of a time law's profile: kinds of numbers, as NumPy names them, and shapes."""
+
 GUIDES = "placed.guides_mm"
 """Positions of the base joints along their guides, for a reconfigurable machine."""
 
 WAYPOINTS, BOX = "setup.waypoints", "setup.box_mm"
 """For one of several set-ups: first and last waypoint (2,) and box (2, 3) of its piece of the toolpath."""
+
+
+def profile_of(arrays: Mapping[str, NDArray[Any]]) -> Profile:
+    """Return the profile of the time law that plan.npz has in arrays of `PROFILE_FORMS`."""
+    times, stations, speeds, active, shares, names = (arrays[name] for name in PROFILE_FORMS)
+    return Profile(
+        times, to_si(stations, "mm"), to_si(speeds, "mm_s"), active.astype(np.intp), shares,
+        tuple(str(name) for name in names),
+    )  # fmt: skip
 
 
 def job_file_of(folder: Path) -> Path | None:

@@ -16,7 +16,16 @@ from pentapod.base.units import to_si
 from pentapod.base.values import Value
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.artefacts import ARRAYS, PROGRAM
-from pentapod.job.plan_arrays import GUIDES, JOB_FILE, LAW_NAMES, PLACEMENT, WAYPOINTS
+from pentapod.job.plan_arrays import (
+    GUIDES,
+    JOB_FILE,
+    LAW_NAMES,
+    PIECE_STARTS,
+    PLACEMENT,
+    PROFILE_FORMS,
+    WAYPOINTS,
+    profile_of,
+)
 from pentapod.job.run_folder import check_run
 from pentapod.kinematics.component import Component
 from pentapod.kinematics.robot import Branch
@@ -30,7 +39,6 @@ from pentapod.planning.problem.weights import NEEDED_MARGIN
 from pentapod.program.csv import read_header
 from pentapod.timing.reuse import TimeLaws
 from pentapod.timing.time_law.motion_law import MotionLaw
-from pentapod.timing.time_law.trajectory import Profile
 from pentapod.toolpath.formats import read_toolpath
 from pentapod.toolpath.toolpath import Toolpath
 
@@ -43,13 +51,8 @@ _FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
     "placed.component": ("i", (2,)),
     "placed.axes": ("f", (None, 3)),
     "placed.tips_mm": ("f", (None, 3)),
-    "trajectory.piece_starts_s": ("f", (None,)),
-    "trajectory.time_s": ("f", (None,)),
-    "trajectory.station_mm": ("f", (None,)),
-    "trajectory.speed_mm_s": ("f", (None,)),
-    "trajectory.active": ("iu", (None,)),
-    "trajectory.shares": ("f", (None,)),
-    "trajectory.constraint_names": ("U", (None,)),
+    PIECE_STARTS: ("f", (None,)),
+    **PROFILE_FORMS,
     LAW_NAMES[0]: ("i", (None,)),
     **dict.fromkeys(LAW_NAMES[1:], ("f", (None,))),
 }
@@ -143,9 +146,4 @@ def _laws(arrays: dict[str, NDArray[Any]]) -> TimeLaws:
     times, stations, speeds = (np.split(value, ends[:-1]) for value in knots)
     accelerations, jerks = (np.split(value, inner[:-1]) for value in values[3:])
     laws = tuple(MotionLaw(*each) for each in zip(times, stations, speeds, accelerations, jerks, strict=True))
-    profile = Profile(
-        arrays["trajectory.time_s"], to_si(arrays["trajectory.station_mm"], "mm"),
-        to_si(arrays["trajectory.speed_mm_s"], "mm_s"), arrays["trajectory.active"], arrays["trajectory.shares"],
-        tuple(str(name) for name in arrays["trajectory.constraint_names"]),
-    )  # fmt: skip
-    return TimeLaws(laws, arrays["trajectory.piece_starts_s"], profile)
+    return TimeLaws(laws, arrays[PIECE_STARTS], profile_of(arrays))

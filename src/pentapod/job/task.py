@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
-from pentapod.base.errors import ToolpathError
 from pentapod.base.refusal import Refusal
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.job.build.limits import placement_limits
@@ -182,13 +181,7 @@ class Task:
         tolerances = (self.closer * asked.path_tolerance, self.closer * asked.axis_tolerance)
         path, axis = tolerances_beside(placed, asked.collision_world or NOTHING, *tolerances)
         stop_angle = self.job.feed.si.stop_angle
-        try:
-            return leg_path(placed, self.machine, path_tolerance=path, axis_tolerance=axis, stop_angle=stop_angle)
-        except ToolpathError as error:
-            if error.key != "path_tolerance":
-                raise
-            cause = "the path bends too sharply to measure its length"
-            return Refusal("leg path", cause, remedy=f"It may take {error.remedy}")
+        return leg_path(placed, self.machine, path_tolerance=path, axis_tolerance=axis, stop_angle=stop_angle)
 
     def _program(self, placed: PlacedPath, trajectory: Trajectory, file: Path) -> Program:
         made_on = (processor_kind(), library_versions())

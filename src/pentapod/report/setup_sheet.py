@@ -10,24 +10,19 @@ from pentapod.planning.diagnosis import ActiveLimit, active_limits
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.report.drawings.planned_run import PlannedRun
 from pentapod.report.drawings.touch_off import touch_off_points, touch_off_table
-from pentapod.report.drawings.views import all_drawings
+from pentapod.report.drawings.views import setup_drawings
 from pentapod.report.figure import DETAIL
 from pentapod.report.margin_band import margin_band
 from pentapod.report.words import number
 
 
-def setup_drawings(outcome: Outcome) -> str:
-    """Return the drawings of the part in the machine as HTML figures; none where no placement was found."""
-    run = PlannedRun.of(outcome)
-    return "" if run is None else all_drawings(run)
-
-
-def setup_sheet(outcome: Outcome) -> str:
-    """Return what stands below the drawings, as HTML; empty where no placement was found."""
+def setup_sheet(outcome: Outcome) -> tuple[str, str]:
+    """Return drawings of the part in the machine and what stands below, as HTML; empty where it has no placement."""
     run = PlannedRun.of(outcome)
     if run is None:
-        return ""
-    return f"<p>{_standing(run)}</p>{touch_off_table(touch_off_points(run))}"
+        return "", ""
+    points = touch_off_points(run)
+    return setup_drawings(run, points), f"<p>{_standing(run)}</p>{touch_off_table(points)}"
 
 
 def margins_along_path(outcome: Outcome) -> str:

@@ -11,7 +11,7 @@ from pentapod.planning import PlacedPath
 from pentapod.report.drawings.colours import OTHER_COLOUR, RAMP
 from pentapod.report.pack import Packed
 from pentapod.report.page.causes import OTHER
-from pentapod.report.page.keys import MARGIN_SCALE, SEGMENT_KINDS, Moments, joints_of
+from pentapod.report.page.keys import MARGIN_SCALE, SEGMENT_KINDS, Moments, legs_beside
 
 SHORTEST_S = 1e-6
 """Least seconds from a waypoint to the next."""
@@ -21,7 +21,7 @@ TIME_STEP_S = 1e-3
 
 def toolpath_motion(packed: Packed, placed: PlacedPath, machine: Machine) -> dict[str, Any]:
     """Add the arrays of the motion along a path at its feeds, without acceleration limits, and return the rest."""
-    toolpath, (beside, joints) = placed.toolpath, joints_of(machine, placed.tips, placed.axes)
+    toolpath, (beside, joints) = placed.toolpath, legs_beside(machine, placed.tips, placed.axes)
     way = np.linalg.norm(np.diff(toolpath.tips, axis=0), axis=1)
     feeds = np.array([min(segment.feed, machine.rapid_velocity) for segment in toolpath.segments])
     segments = toolpath.segment_of_interval

@@ -15,11 +15,11 @@ from pentapod.base.archives import check_array, read_arrays
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import InputError
 from pentapod.base.refusal import Advice, Change, Refusal, Shortfall
-from pentapod.base.units import to_si
 from pentapod.geometry.polyline import arc_length
 from pentapod.job.artefacts import ARRAYS, VERDICT
 from pentapod.job.build.limits import placement_limits
 from pentapod.job.outcome import Outcome
+from pentapod.job.plan_arrays import PIECE_STARTS, PROFILE_FORMS, profile_of
 from pentapod.job.stage_runner import Stage
 from pentapod.planning import PlacedPath, Placement
 from pentapod.planning.limits.margins import Margins
@@ -35,16 +35,7 @@ READ_BACK, IN_THE_MIDDLE = "the run in the folder", "nothing: without a placemen
 SAME_M = 1e-7
 """Metres within which a station is that of a segment's beginning."""
 
-_LAW: dict[str, tuple[str, tuple[int | None, ...]]] = {
-    "trajectory.time_s": ("f", (None,)),
-    "trajectory.station_mm": ("f", (None,)),
-    "trajectory.speed_mm_s": ("f", (None,)),
-    "trajectory.active": ("iu", (None,)),
-    "trajectory.shares": ("f", (None,)),
-    "trajectory.constraint_names": ("U", (None,)),
-    "trajectory.piece_starts_s": ("f", (None,)),
-}
-"""Arrays of plan.npz: kinds of numbers, as NumPy names them, and shapes."""
+_LAW = {**PROFILE_FORMS, PIECE_STARTS: ("f", (None,))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,11 +85,7 @@ def stored_law(run: OpenedRun, placed: PlacedPath) -> StoredLaw | None:
         return None
     for name, form in _LAW.items():
         check_array(arrays[name], name, file, InputError, *form)
-    times, stations, speeds, active, shares, names, pieces = (arrays[name] for name in _LAW)
-    profile = Profile(
-        times, to_si(stations, "mm"), to_si(speeds, "mm_s"), active.astype(np.intp), shares,
-        tuple(str(name) for name in names),
-    )  # fmt: skip
+    profile, pieces = profile_of(arrays), arrays[PIECE_STARTS]
     travelled = arc_length(placed.tips)
     scale = profile.stations[-1] / travelled[-1] if travelled[-1] > 0.0 else 0.0
     return StoredLaw(profile, pieces[:-1], travelled[run.toolpath.starts[:-1]] * scale)

@@ -16,7 +16,7 @@ from pentapod.report.drawings.colours import LIMIT_COLOUR, RAMP
 from pentapod.report.drawings.planned_run import PlannedRun
 from pentapod.report.drawings.touch_off import touch_off_points, touch_off_text
 from pentapod.report.pack import MESH_STEP_MM, Packed
-from pentapod.report.page.keys import joints_of
+from pentapod.report.page.keys import legs_beside
 from pentapod.report.page.page import TEMPLATE, ReportedRun, contents
 from pentapod.report.page.scene import LIFT_M
 from pentapod.report.signals import TimeLaw
@@ -78,7 +78,7 @@ class ViewedRun(ReportedRun):
             tips, axes = self.placed.tips, self.placed.axes
         else:
             tips, axes = self.signals.tips[self.keys.rows], self.signals.axes[self.keys.rows]
-        beside = joints_of(self.machine, tips, axes)[0]
+        beside = legs_beside(self.machine, tips, axes)[0]
         moved = placement @ self.opened.placement.inverse()
         joints = leg_ends(self.machine, moved.apply(tips), moved.rotate(axes))[1][:, beside]
         return np.round(1e3 * joints.ravel(), 3).tolist()

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from pentapod.base.errors import JobError, ToolpathError
+from pentapod.base.errors import JobError
 from pentapod.cli.commands.new import dome_stl
 from pentapod.cli.main import run as run_cli
 from pentapod.geometry import angle_between
@@ -226,13 +226,3 @@ def test_the_passes_of_a_part_in_use_are_made_once(make_job, monkeypatch):
     np.testing.assert_array_equal(again.tips, first.tips)
     job_toolpath(job.with_(toolpath={"stepover_mm": 14.0}), mesh)
     assert len(made) == 2
-
-
-def test_a_path_that_bends_too_sharply_is_refused(make_job, tmp_path, monkeypatch):
-    def sharp(*_, **__):
-        raise ToolpathError("too sharp", key="path_tolerance", remedy="a larger tolerance.path_mm")
-
-    monkeypatch.setattr("pentapod.job.task.leg_path", sharp)
-    refusal = run(Job.load(make_job()), tmp_path / "out", advice=None).refusal
-    cause = "the path bends too sharply to measure its length"
-    assert str(refusal) == f"leg path: {cause}. It may take a larger tolerance.path_mm"

@@ -1,5 +1,7 @@
 """LegPath: true to inverse kinematics, over the tip's arc length, within tolerance, resting where it must."""
 
+import re
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +19,7 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning.leg_path.leg_path import LegPath, leg_path
 from pentapod.planning.leg_path.tolerances import tolerances_beside
+from pentapod.planning.leg_path.tool_curve import ToolCurve
 from pentapod.planning.placement.placed_path import PlacedPath, Placement
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
@@ -245,6 +248,15 @@ def test_a_path_that_does_not_move_is_refused(desk):
     answer = leg_path(placed, desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
     assert isinstance(answer, Refusal)
     assert "does not move" in answer.cause
+
+
+def test_a_path_that_bends_too_sharply_is_refused(desk, mixed, monkeypatch):
+    """No path is known that needs more than a few halvings: none are allowed here."""
+    monkeypatch.setattr(sys.modules[ToolCurve.__module__], "HALVINGS", 0)
+    answer = leg_path(mixed[0], desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(answer, Refusal)
+    assert re.search(r"bends too sharply .*, between waypoints 0 and \d+$", answer.cause)
+    assert "tolerance.path_mm" in answer.remedy
 
 
 @pytest.mark.parametrize("bad", [0.0, -1e-6, np.nan])

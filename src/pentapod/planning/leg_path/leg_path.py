@@ -17,7 +17,7 @@ from pentapod.base.values import Result, Value
 from pentapod.geometry.fillet import BULGE, blended, knots_between
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.machine import Machine
-from pentapod.planning.leg_path.tool_curve import ToolCurve
+from pentapod.planning.leg_path.tool_curve import ToolCurve, TooSharpError
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.toolpath.toolpath import Segment, SegmentKind
 
@@ -172,7 +172,7 @@ def leg_path(
     linear between them (`tolerances_beside`). Corners are blended within both; waypoints on a straight way between
     others do not shape the path. The machine stops where a rapid meets another kind of motion, where the toolpath has a
     stop, and at corners that turn by more than `stop_angle` radians. Raises ToolpathError for numbers that are not
-    positive. Returns a Refusal for a path without motion.
+    positive. Returns a Refusal for a path without motion, or one that bends too sharply.
 
     >>> path = leg_path(placed, machine, path_tolerance=20e-6, axis_tolerance=np.radians(0.5)).unwrap()
     """
@@ -210,7 +210,12 @@ def leg_path(
         rows = a + np.flatnonzero(shaping[a : b + 1])
         between = knots_between(u[rows] - u[a], _reach(u[rows], points[rows], allowed[rows]))
         both = blended(u[rows] - u[a], np.hstack([points[rows], allowed[rows]]), _too_far, between)
-        curve = ToolCurve.of(BSpline(both.t, both.c[:, :6].copy(), both.k), toolpath.tilt_centre)
+        try:
+            curve = ToolCurve.of(BSpline(both.t, both.c[:, :6].copy(), both.k), toolpath.tilt_centre)
+        except TooSharpError:
+            first, last = np.flatnonzero(keep)[[a, b]]
+            cause = f"the path bends too sharply to measure its length, between waypoints {first} and {last}"
+            return Refusal("leg path", cause, remedy="A larger tolerance.path_mm may help")
         ends = np.flatnonzero(np.diff(segment[a:b], append=-1)) + 1
         which = segment[a:b][ends - 1]
         pieces.append(

@@ -24,6 +24,10 @@ HALVINGS = 12
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(6)
 
 
+class TooSharpError(ToolpathError):
+    """The lengths of a curve cannot be measured to ARC_LENGTH_ERROR: somewhere it nearly turns back."""
+
+
 @dataclass(frozen=True, eq=False)
 class ToolCurve:
     """Tip and axis as C3 functions of s in metres, ds² = |d tip|² + (REORIENTATION_LEVER_M |d axis|)².
@@ -39,7 +43,10 @@ class ToolCurve:
 
     @classmethod
     def of(cls, spline: BSpline, tilt_centre: float) -> ToolCurve:
-        """Return the curve of a C3 spline of tilt centres and axes (6 columns). Raises ToolpathError at rest."""
+        """Return the curve of a C3 spline of tilt centres and axes (6 columns).
+
+        Raises ToolpathError at rest, and TooSharpError.
+        """
         knots = np.unique(spline.t)
         powers = [spline(knots[:-1], k) / factorial(k) for k in range(spline.k, -1, -1)]
         curve = PPoly(np.stack(powers), knots)
@@ -128,9 +135,7 @@ def _parameter_over_length(curve: PPoly, tilt_centre: float) -> PPoly:
         lengths = np.insert(lengths, coarse + 1, late)
         first = coarse + np.arange(len(coarse))
         unknown = np.sort(np.concatenate([first, first + 1]))
-    raise ToolpathError(
-        "the path bends too sharply to measure its length", key="path_tolerance", remedy="a larger tolerance.path_mm"
-    )
+    raise TooSharpError("the path bends too sharply to measure its length")
 
 
 def _inverse(curve: PPoly, u: Floats, tilt_centre: float) -> Floats:

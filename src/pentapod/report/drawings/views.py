@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.job.outcome import Outcome
 from pentapod.machine.leg_ends import arms_beside, base_rim, leg_ends, line_top, rails, strut_ends
 from pentapod.machine.machine import Machine
 from pentapod.report.drawings.colours import HELD_COLOUR, LIMIT_COLOUR, QUIET_COLOUR, leg_colour
 from pentapod.report.drawings.outline import Outline, outline_of
 from pentapod.report.drawings.paper import Paper, Rooms
 from pentapod.report.drawings.planned_run import PlannedRun
-from pentapod.report.drawings.touch_off import TouchOff, touch_off_points
+from pentapod.report.drawings.touch_off import TouchOff
 
 MOST_POINTS = 1500
 """Points of the tool path that are drawn."""
@@ -93,31 +92,20 @@ class _Bones:
         ])  # fmt: skip
 
 
-def setup_drawings(run: PlannedRun) -> str:
-    """Return three drawings as SVG in <figure>s: the machine from above, from the front, and the part from above.
+def setup_drawings(run: PlannedRun, points: Sequence[TouchOff]) -> str:
+    """Return four drawings as SVG in <figure>s: machine from above and from the front, part from above and the side.
 
-    Their letters have the size of the page's captions where a drawing is 350 CSS pixels wide.
+    The part from the side is seen along its lean, where it is tilted. Letters have the size of the page's captions
+    where a drawing is 350 CSS pixels wide. points: to touch off.
     """
-    above, front = _from_above(run.hangs), _from_front(run.hangs)
-    part_above, part_front = (view.seen(run.vertices, run.mesh.faces) for view in (above, front))
-    points = touch_off_points(run)
+    above, front, side = _from_above(run.hangs), _from_front(run.hangs), _along_lean(run)
+    part_above, part_front, part_side = (view.seen(run.vertices, run.mesh.faces) for view in (above, front, side))
     return (
         _in_machine(run, above, part_above)
         + _in_machine(run, front, part_front)
         + _part(run, above, part_above, points)
+        + _part(run, side, part_side, points)
     )
-
-
-def all_drawings(run: PlannedRun) -> str:
-    """Return the three drawings, and the part from the side: along its lean, where it is tilted."""
-    view = _along_lean(run)
-    return setup_drawings(run) + _part(run, view, view.seen(run.vertices, run.mesh.faces), touch_off_points(run))
-
-
-def drawings_of(outcome: Outcome) -> str:
-    """Return the three drawings of an outcome; empty where its part has no place."""
-    run = PlannedRun.of(outcome)
-    return "" if run is None else setup_drawings(run)
 
 
 def machine_drawings(machine: Machine) -> str:

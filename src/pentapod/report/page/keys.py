@@ -98,7 +98,7 @@ class Keys:
     def of(cls, signals: Signals, machine: Machine, placed: PlacedPath, tolerance: float) -> Keys:
         """Return the keys of a program. tolerance: of the program against the path, metres."""
         tips, axes = signals.tips, signals.axes
-        beside, joints = joints_of(machine, tips, axes)
+        beside, joints = legs_beside(machine, tips, axes)
         far = 1e3 * (machine.tool_length - machine.line_top)
         shown = np.concatenate([1e3 * tips, far * axes, 1e3 * joints.reshape(len(tips), -1)], axis=1)
         must = _marked(signals)
@@ -154,7 +154,7 @@ def _scale(name: str, array: str, unit: str, worst: float, best: float, ends: tu
 MARGIN_SCALE = _scale("smallest margin", "key.margin", "", 0.0, 0.5, ("0, at a limit", "0.25", "0.5 or more"))
 
 
-def joints_of(machine: Machine, tips: Floats, axes: Floats) -> tuple[Ints, Floats]:
+def legs_beside(machine: Machine, tips: Floats, axes: Floats) -> tuple[Ints, Floats]:
     """Return which legs (B,) end beside the tool axis of the poses (N, 3), and their joints (N, B, 3)."""
     beside = joints_beside(machine, tips[0], axes[0])
     joints = leg_ends(machine, tips, axes)[1][:, beside] if len(beside) else np.zeros((len(tips), 0, 3))

@@ -29,7 +29,7 @@ from pentapod.report.page.keys import SEGMENT_KINDS, Keys
 from pentapod.report.page.plots import bucket_words, plots_of
 from pentapod.report.page.preparations import facts, preparations, provenance
 from pentapod.report.page.scene import scene_of
-from pentapod.report.setup_sheet import margins_along_path, setup_drawings, setup_sheet
+from pentapod.report.setup_sheet import margins_along_path, setup_sheet
 from pentapod.report.signals import Signals, TimeLaw
 from pentapod.report.template import write_page
 from pentapod.report.worst import worst_places
@@ -147,6 +147,7 @@ def _context(run: ReportedRun, motion: dict[str, Any] | None) -> dict[str, Any]:
     outcome, signals = run.outcome, run.signals
     placed, program, verdict = outcome.find(PlacedPath), outcome.find(Program), outcome.verdict
     total = 0.0 if program is None else program.duration
+    drawings, below = setup_sheet(outcome)
     return {
         "job": outcome.job,
         "machine": outcome.machine,
@@ -172,8 +173,8 @@ def _context(run: ReportedRun, motion: dict[str, Any] | None) -> dict[str, Any]:
         "placement": None if placed is None else _placement(outcome.job, placed.placement.transform),
         "setups": outcome.find(SetUps),
         "one_of_several": outcome.find(Piece) is not None,
-        "drawings": setup_drawings(outcome),
-        "setup_sheet": setup_sheet(outcome),
+        "drawings": drawings,
+        "setup_sheet": below,
         "margins": margins_along_path(outcome),
         "chosen_by": "" if placed is None else placed.placement.chosen_by,
         "component": "" if placed is None else str(placed.component),

@@ -20,8 +20,8 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.placed_path import PlacedPath, UnplacedPath
 from pentapod.report.decimate import thinned_mesh
 from pentapod.report.drawings.colours import HELD_COLOUR, LIMIT_COLOUR, PART_COLOUR, QUIET_COLOUR, leg_colour
+from pentapod.report.drawings.held import held_at
 from pentapod.report.figure import DETAIL
-from pentapod.report.held import held_mesh
 from pentapod.report.pack import MESH_STEP_MM, Packed
 from pentapod.report.page.keys import joints_beside
 from pentapod.report.signals import Signals
@@ -67,7 +67,7 @@ def scene_of(packed: Packed, outcome: Outcome, signals: Signals | None, machine:
             beside = joints_beside(machine, signals.tips[0], signals.axes[0])
         elif placed.placement.rail_positions is not None:
             machine = machine.at(placed.placement.rail_positions)
-        if (held := held_mesh(outcome, placed)) is not None:
+        if (held := held_at(outcome.job, placed.placement.transform)) is not None:
             vertices, faces = thinned_mesh(held.vertices, held.faces, DETAIL.facets)
             packed.mesh("held", 1e3 * vertices, faces)
             moves = outcome.job.fixture.frame != "machine"

@@ -13,7 +13,7 @@ from pentapod.job.artefacts import PROGRAM
 from pentapod.job.outcome import Outcome, SetUps
 from pentapod.report.drawings.planned_run import PlannedRun
 from pentapod.report.drawings.touch_off import touch_off_points
-from pentapod.report.drawings.views import all_drawings
+from pentapod.report.drawings.views import setup_drawings
 from pentapod.report.sheet import facts
 from pentapod.toolpath.linking.partition import Piece
 
@@ -92,7 +92,7 @@ def _shown(page: SheetPage, number: int, count: int) -> dict[str, object]:
         "number": number,
         "count": count,
         "passed": page.passed,
-        "drawings": all_drawings(run),
+        "drawings": setup_drawings(run, points),
         "facts": [
             ("Tool", facts.tool_facts(run)),
             ("Part", facts.stand_facts(run)),

@@ -27,9 +27,9 @@ export async function compare() {
   document.documentElement.dataset.ready = Math.round(performance.now());
 }
 
-/** The report of a frame, once it is drawn. */
+/** The report of a frame, once it is drawn. While it loads, its document has no element at times. */
 async function drawn(frame) {
-  while (!frame.contentDocument?.documentElement.dataset.drawn) await new Promise((later) => { setTimeout(later, 50); });
+  while (!frame.contentDocument?.documentElement?.dataset.drawn) await new Promise((later) => { setTimeout(later, 50); });
   return frame.contentWindow.report;
 }
 
