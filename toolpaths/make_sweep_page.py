@@ -69,7 +69,9 @@ def table(rows: list[Row]) -> str:
         "|---|---|---|---|---|---|",
     ]
     for row in rows:
-        figures = f"{row['margin']:.3f} | {row['margin_limit']} | {row['cycle_time_s']:.2f}" if row["margin"] else "| |"
+        figures = "– | – | –"
+        if row["status"] == "passed":
+            figures = f"{row['margin']:.3f} | {row['margin_limit']} | {row['cycle_time_s']:.2f}"
         lines.append(f"| {row[LENGTH]:g} | {row[TILT]:g} | {row['status']} | {figures} |")
     return "\n".join(lines)
 

@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,13 +18,16 @@ from pentapod.design import search as module
 from pentapod.design.design_file import DesignFile
 from pentapod.design.evaluation import Sample, worst_poses
 from pentapod.design.figures import in_poses
+from pentapod.design.members import job_on_design
 from pentapod.design.part_poses import PartPoses
 from pentapod.design.proof import FORCES, SHAPE, ProofOptions, prove, worst_of
 from pentapod.design.proof_tasks import proof_of, proof_task, prove_in
 from pentapod.design.search import search, undominated
+from pentapod.job import Job
 from pentapod.machine import Machine, check
 
 LOGS = (LOG, ".lock")
+TOOLPATHS = Path(__file__).parents[2] / "toolpaths"
 
 
 def test_undominated_rows():
@@ -165,3 +169,13 @@ def test_missing_pymoo_is_an_error_that_says_what_to_install(design_file, tmp_pa
     monkeypatch.setitem(sys.modules, "pymoo.algorithms.moo.nsga2", None)
     with pytest.raises(InputError, match=r'pip install "pentapod\[design\]"'):
         search(DesignFile.load(design_file()), tmp_path)
+
+
+def test_a_table_moves_with_the_work_volume(design_file):
+    """Its height counts from the base, whose distance from the work volume is a designer's choice."""
+    file = DesignFile.load(design_file())
+    job = Job.load(TOOLPATHS / "dome.toml")
+    moved = job_on_design(job, file, {"work_volume": {"centre_mm": [0.0, 0.0, 567.0]}})
+    assert (job.placement.table_z_mm, moved.placement.table_z_mm) == (450.0, pytest.approx(550.0))
+    free = job.with_(placement={"mode": "free", "table_z_mm": None})
+    assert job_on_design(free, file, {}) is free

@@ -157,7 +157,7 @@ def test_a_file_that_states_its_unit_is_not_guessed(tmp_path):
     job, proposal = proposed(tmp_path, trimesh.Scene(dome(1e-3)), "part.glb")
     assert job.part.unit is None
     assert job.part.flip is False
-    assert "guess" not in " ".join(proposal.remarks)
+    assert "a guess from its size" not in " ".join(proposal.remarks)
     assert proposal.remarks[0].startswith("the part is 60 x 60 x")
 
 

@@ -15,3 +15,18 @@ class Progress(Protocol):
 
 def silent(stage: str, fraction: float, note: str = "") -> None:
     """Ignore the report: the default of all stages."""
+
+
+def within(progress: Progress, stage: str, begin: float, end: float) -> Progress:
+    """Return the progress of a step: its fractions are those of a stage, from `begin` to `end`; its name is the note.
+
+    A step that is done again does not go back.
+    """
+    furthest = begin
+
+    def shown(step: str, fraction: float, note: str = "") -> None:
+        nonlocal furthest
+        furthest = max(furthest, begin + (end - begin) * fraction)
+        progress(stage, furthest, note or step)
+
+    return shown

@@ -5,8 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +31,7 @@ from pentapod.design.proof import Proof, worst_of
 from pentapod.design.proof_tasks import proof_of, proof_task
 from pentapod.design.quantities import QUANTITIES, completed
 from pentapod.design.search import Found, search, undominated
+from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine, read_machine
 from pentapod.machine.report.report import check
 
@@ -178,7 +181,9 @@ def _missed(need: Need, proven: dict[str, float]) -> str:
 def _with_parts(file: DesignFile, members: list[Member], engine: Engine, progress: Progress) -> list[Member]:
     """Return members with each job planned on their machines."""
     machines = [tomllib.loads(member.machine) for member in members]
-    tasks = [job_task(job, engine.store, machine=machine) for machine in machines for job in file.jobs]
+    tasks = [
+        job_task(job_on_design(job, file, now), engine.store, machine=now) for now in machines for job in file.jobs
+    ]
     rows, count = _done(engine, tasks, "parts", progress) if tasks else [], len(file.jobs)
     found: list[Member] = []
     for number, member in enumerate(members):
@@ -188,3 +193,11 @@ def _with_parts(file: DesignFile, members: list[Member], engine: Engine, progres
         )
         found.append(replace(member, parts=parts, missing=tuple(f"{p.job}: {p.said}" for p in parts if not p.passed)))
     return found
+
+
+def job_on_design(job: Job, file: DesignFile, machine: Mapping[str, Any]) -> Job:
+    """Return a job on a designed machine: its table keeps its height in the work volume."""
+    if job.placement.table_z_mm is None:
+        return job
+    rise_mm = machine["work_volume"]["centre_mm"][2] - 1e3 * float(file.unknowns.start.centre[2])
+    return job.with_(**{"placement.table_z_mm": job.placement.table_z_mm + rise_mm})

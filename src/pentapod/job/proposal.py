@@ -109,11 +109,15 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
     if box is not None:
         table["region_box_mm"] = [[_rounded(v) for v in corner] for corner in from_si(box, "mm")]
         reasons["part", "region_box_mm"] = "the part is larger than the machine's work volume; this is its middle"
-        remarks.append("it is larger than the work volume: a box in its middle is machined (region_box_mm)")
     region = Region(box=box, direction=direction)
     patch = Patch.of(mesh, replace(region, angle=0.5 * np.pi))
     if not len(patch.faces):
         raise MeshError("no side of this surface can be machined", file=part, remedy="check the mesh")
+    if box is not None:
+        remarks.append(
+            "it is larger than the work volume: a box in its middle is machined (region_box_mm), "
+            f"{100.0 * float(patch.areas.sum() / mesh.facet_areas.sum()):.2g} % of the surface"
+        )
     toolpath, tool = _toolpath(patch, direction), _tool(patch, direction)
     toolpath = {**toolpath, "stepover_mm": _rounded(OPTIONS.stepover * tool["diameter_mm"])}
     foot = _foot(mesh, patch, direction, tool) if box is None else None
@@ -125,10 +129,12 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
         toolpath["steep_deg"] = OPTIONS.steep_deg
         reasons["toolpath", "steep_deg"] = "upright walls get waterlines: passes of a raster do not cover all of them"
         remarks.append(f"upright walls, {100.0 * walls:.2g} % of what faces {side}, get waterlines (steep_deg)")
-    remarks.append(
-        f"a ball of {tool['diameter_mm']:g} mm, {toolpath['strategy']}, {toolpath['stepover_mm']:g} mm apart"
-    )
     reasons["placement", "table_z_mm"] = "in the middle of the work volume; set the height of your table"
+    placement = _placement(mesh, patch, direction, machine.work)
+    remarks += [
+        f"a ball of {tool['diameter_mm']:g} mm, {toolpath['strategy']}, {toolpath['stepover_mm']:g} mm apart",
+        f"table_z_mm = {placement['table_z_mm']:g} is a guess: set the height of your table",
+    ]
     tables = {
         "part": table,
         "machine": {"file" if name.endswith(".toml") else "name": name},
@@ -136,7 +142,7 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
         "toolpath": toolpath,
         "axis": {"mode": "auto"},
         "feed": {"cut_mm_min": OPTIONS.feed_mm_min},
-        "placement": _placement(mesh, patch, direction, machine.work),
+        "placement": placement,
     }
     return Proposal(tables, reasons, tuple(remarks))
 

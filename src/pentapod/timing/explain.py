@@ -49,7 +49,16 @@ class Cause(Value):
     def __str__(self) -> str:
         if self.name == STANDSTILL:
             return f"{self.name} for {self.time:.3g} s"
-        return f"{self.name}-limited for {self.time:.3g} s; without this limit at most {self.cost:.3g} s shorter"
+        return f"{self.name}-limited for {self.time:.3g} s; {self.gain}"
+
+    @property
+    def gain(self) -> str:
+        """What the program would gain without this limit; for those of the lower bound, that it would."""
+        if self.name in ("feed", "rapid rate"):
+            return f"shorter with a higher {self.name}"
+        if self.name.startswith("leg ") and self.name.endswith(" velocity"):
+            return "shorter with a faster leg"
+        return f"without this limit at most {self.cost:.3g} s shorter"
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from contextlib import contextmanager
+from itertools import groupby
 
 import numpy as np
 import pytest
@@ -67,8 +68,12 @@ def test_long_work_on_a_toolpath_shows_its_progress(make_job, tmp_path, monkeypa
     monkeypatch.setattr("pentapod.cli.commands.toolpath.progress_bar", recorder)
     assert run_cli(["toolpath", str(make_job()), "-o", str(tmp_path / "path.csv")]) == 0
     assert [note for stage, _, note in told if stage == "mesh" and note] == ["reading", "welding", "edges"]
-    assert {stage for stage, _, _ in told} == {"mesh", "toolpath", "gouge", "writing"}
-    assert all(0.0 <= fraction <= 1.0 for _, fraction, _ in told)
+    assert {stage for stage, _, _ in told} == {"mesh", "toolpath", "writing"}
+    steps = [(fraction, note) for stage, fraction, note in told if stage == "toolpath"]
+    names = ["", "drive surface", "passes", "waypoints and links", "gouge check", ""]
+    assert [name for name, _ in groupby(note for _, note in steps)] == names
+    assert [fraction for fraction, _ in steps] == sorted(fraction for fraction, _ in steps)
+    assert (steps[0][0], steps[-1][0]) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize(

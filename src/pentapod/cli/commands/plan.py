@@ -144,6 +144,7 @@ def shown(
 ) -> tuple[int, dict[str, Any] | None]:
     """Print the outcome of a run in a folder, as text; return the exit code, and what JSON says."""
     from pentapod.job.artefacts import PROGRAM, REPORT, SHEET
+    from pentapod.job.build.toolpath import Reports, machined_share
     from pentapod.job.outcome import SetUps
     from pentapod.planning import PlacedPath
     from pentapod.planning.diagnosis import active_limits
@@ -163,6 +164,8 @@ def shown(
             click.echo(_explained(outcome))
         if refusal is None:
             click.echo(verdict_text(outcome.verdict))
+            if (reports := outcome.find(Reports)) is not None and (machined := machined_share(reports)) < 1.0:
+                click.echo(f"machined: {100.0 * machined:.3g} % of the surface, the region of the job")
             setups = outcome.find(SetUps)
             folders = [out] if setups is None else [out / part.folder for part in setups.parts]
             click.echo("\n".join(f"program: {folder / PROGRAM}" for folder in folders))

@@ -25,9 +25,11 @@ def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet
     .tap), both also as xyzab-g93 and xyzbc-g93 with inverse time feed, sinumerik (.mpf), robodk (.robodk.csv), csv,
     npz. Axes point from the tip to the spindle; the frame is that of the workpiece.
     """
+    from pentapod.base.errors import JobError
     from pentapod.geometry import arc_length
+    from pentapod.job.build.reach import check_reach
     from pentapod.job.build.toolpath import job_toolpath
-    from pentapod.job.build.values import job_mesh
+    from pentapod.job.build.values import job_machine, job_mesh
     from pentapod.job.schema.job import Job
     from pentapod.toolpath.formats import format_of, write_toolpath
 
@@ -37,6 +39,11 @@ def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet
         progress("mesh", 0.0)
         mesh = job_mesh(loaded, progress)
         progress("mesh", 1.0)
+        try:
+            check_reach(loaded, job_machine(loaded), mesh)
+        except JobError as error:  # a part that is too large may be for another machine; a wrong unit takes a long time
+            if error.key == "part.unit":
+                raise
         progress("toolpath", 0.0)
         path, report = job_toolpath(loaded, mesh, progress)
         progress("toolpath", 1.0)

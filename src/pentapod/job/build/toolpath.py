@@ -12,14 +12,14 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import MeshError, ToolpathError
 from pentapod.base.keys import fields_from
-from pentapod.base.progress import Progress, silent
+from pentapod.base.progress import Progress, silent, within
 from pentapod.base.units import from_si
 from pentapod.cutters.ball import BallCutter
 from pentapod.cutters.mounted import BallEnded, Mounted
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.solids import Cone
-from pentapod.job.build.region import covers_region, job_region, kept_axis, region_report
+from pentapod.job.build.region import RegionReport, covers_region, job_region, kept_axis, region_report
 from pentapod.job.build.tool import job_tool
 from pentapod.job.build.words import in_words_of
 from pentapod.job.schema.job import Job
@@ -55,6 +55,9 @@ _KNOWN: WeakKeyDictionary[Mesh, dict[tuple[Tool, PathOptions, bytes], tuple[Tool
 )
 """Toolpaths over parts that are in use: many changes of a job, as of its placement, leave its passes as they are."""
 
+CHECKED = 0.9
+"""Share of the stage's time after which the toolpath is there, and its gouges are looked for."""
+
 BESIDE = 0.2
 """Share of the gouge tolerance that is kept for a motion beside the path."""
 
@@ -67,6 +70,11 @@ class Reports:
 
     def __str__(self) -> str:
         return "\n".join(str(part) for part in self.parts)
+
+
+def machined_share(reports: Reports) -> float:
+    """Return the share of the surface that the region of a job holds, 0 to 1; 1 where the job covers no region."""
+    return next((part.share.inside for part in reports.parts if isinstance(part, RegionReport)), 1.0)
 
 
 def stem_sentence(tool: Tool) -> str:
@@ -152,12 +160,14 @@ def job_toolpath(
         if covers_region(job):
             region.append(region_report(job, mesh))
         try:
-            toolpath, report = _along_the_part(mesh, tool, asked, kept_axis(job))
+            toolpath, report = _along_the_part(
+                mesh, tool, asked, kept_axis(job), within(progress, "toolpath", 0.0, CHECKED)
+            )
         except (MeshError, ToolpathError) as error:
             raise in_words_of(job, error) from error
         toolpath = stepped(oriented(toolpath, tool, _orientation(job, tool)), job.toolpath.si.axis_step)
     options = gouge_options(job, _remedies(job), None if from_file else job_link_style(job, mesh, toolpath))
-    toolpath, gouges = without_gouges(toolpath, tool, mesh, options, progress)
+    toolpath, gouges = without_gouges(toolpath, tool, mesh, options, within(progress, "toolpath", CHECKED, 1.0))
     if not any(segment.kind is SegmentKind.CUT for segment in toolpath.segments):
         raise ToolpathError(
             "no cut is left: cutter, shank or holder would cut into the part everywhere", key="gouge.remedy"
@@ -173,12 +183,14 @@ def job_toolpath(
     return toolpath, Reports(tuple(reports))
 
 
-def _along_the_part(mesh: Mesh, tool: Tool, options: PathOptions, axis: Floats | None) -> tuple[Toolpath, PathReport]:
+def _along_the_part(
+    mesh: Mesh, tool: Tool, options: PathOptions, axis: Floats | None, progress: Progress
+) -> tuple[Toolpath, PathReport]:
     """Return the toolpath and the report of a strategy, with the axes along the normals or along one direction."""
     known = _KNOWN.setdefault(mesh, {})
     key = tool, options, b"" if axis is None else axis.tobytes()
     if key not in known:
-        known[key] = toolpath_with_report(mesh, tool, options, axis)
+        known[key] = toolpath_with_report(mesh, tool, options, axis, progress)
     return known[key]
 
 

@@ -183,7 +183,7 @@ def _swept(
         enough = (1.0 - RELATIVE_ERROR) * solid.thickness
         for first in range(0, count, CHUNK):
             rows = slice(first, first + CHUNK)
-            progress("gouge", (k + first / count) / parts)
+            progress("gouge check", (k + first / count) / parts)
             found = (depths[k, rows], where[k, rows], facets[k, rows])
             if ball:
                 centres, travels = (np.ascontiguousarray(motions[rows, at : at + 3]) for at in (0, 6))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.job.artefacts import SHEET
 from pentapod.job.build.limits import placement_limits
 from pentapod.job.build.placement import job_at, placement_toml
 from pentapod.job.build.specification import job_collision_world
@@ -44,8 +45,10 @@ TEMPLATE = "page.html.j2"
 
 def write_report(outcome: Outcome, path: str | Path) -> Path:
     """Write report.html on a run and return its path. Raises InputError where it cannot be written."""
-    page, packed, context = contents(ReportedRun(outcome))
-    return write_page(path, TEMPLATE, page, packed, **context)
+    run = ReportedRun(outcome)
+    page, packed, context = contents(run)
+    sheet = SHEET if run.outcome.find(Program) is not None else ""
+    return write_page(path, TEMPLATE, page, packed, **context, sheet_file=sheet)
 
 
 def contents(run: ReportedRun) -> tuple[dict[str, Any], Packed, dict[str, Any]]:

@@ -12,6 +12,8 @@ from pentapod.base.units import from_si
 from pentapod.cutters.mounted import Mounted
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.solids import Cone
+from pentapod.job.build.region import covers_region, job_region
+from pentapod.mesh.region_share import RegionShare
 from pentapod.report import words
 from pentapod.report.drawings.planned_run import PlannedRun
 from pentapod.report.drawings.touch_off import TouchOff
@@ -69,6 +71,10 @@ def stand_facts(run: PlannedRun) -> list[Fact]:
     stand, job = run.stand, run.job
     size = " × ".join(_mm(value, 1) for value in np.ptp(run.mesh.bounds, axis=0))
     facts = [("part", f"{job.mesh_path.name}, {size}"), ("datum", "origin of the mesh; X, Y, Z are its axes")]
+    if covers_region(job):
+        share = RegionShare.of(run.mesh, job_region(job)).inside
+        box = "" if job.part.region_box_mm is None else f", in the box {_box(job.part.region_box_mm)}"
+        facts.append(("machined", f"{100.0 * share:.3g} % of the surface{box}"))
     x, y, z = (words_of(value) for value in 1e3 * run.placement.translation)
     facts.append(("at", f"x {x}, y {y}, z {z}"))
     facts.append(
@@ -154,6 +160,12 @@ def _piece(cone: Cone) -> str:
 
 def _mm(value: float, digits: int = 4) -> str:
     return f"{float(from_si(value, 'mm')):.6g}" if digits > 1 else f"{float(from_si(value, 'mm')):.1f}"
+
+
+def _box(corners: tuple[Sequence[float], Sequence[float]]) -> str:
+    """Return a box of the mesh's frame as text, mm."""
+    ends = zip("XYZ", *corners, strict=True)
+    return ", ".join(f"{axis} {words_of(low)} to {words_of(high)}" for axis, low, high in ends)
 
 
 def _list(values: Floats, digits: int) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError, nearest
 from pentapod.base.keys import check_size
+from pentapod.base.progress import Progress, silent
 from pentapod.base.registry import Registry
 from pentapod.cutters.bull_nose import BullNose
 from pentapod.cutters.tool import Tool
@@ -66,7 +67,7 @@ def strategy_of(options: PathOptions) -> Strategy:
 
 
 def toolpath_with_report(
-    mesh: Mesh, tool: Tool, options: PathOptions, axis: Floats | None = None
+    mesh: Mesh, tool: Tool, options: PathOptions, axis: Floats | None = None, progress: Progress = silent
 ) -> tuple[Toolpath, PathReport]:
     """Return the toolpath of the strategy that takes these options, and its report.
 
@@ -82,10 +83,12 @@ def toolpath_with_report(
     """
     strategy = strategy_of(options)
     check_size(options, float(np.ptp(mesh.bounds, axis=0).max()), ToolpathError)
+    progress("toolpath", 0.0, "drive surface")
     surface = surface_for(mesh, tool, options, axis)
-    return assembled(
-        strategy.name, surface, tool, options, with_fills(surface, strategy.paths(surface, options), options)
-    )
+    progress("toolpath", 0.5, "passes")
+    paths = with_fills(surface, strategy.paths(surface, options), options)
+    progress("toolpath", 0.9, "waypoints and links")
+    return assembled(strategy.name, surface, tool, options, paths)
 
 
 def rolls_over(tool: Tool, options: PathOptions) -> bool:
