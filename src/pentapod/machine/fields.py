@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
 
-from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.arrays import Floats, read_only, set_frozen
 from pentapod.base.errors import MachineError
 from pentapod.kinematics.five_legs import FiveLegs
 
@@ -45,7 +45,7 @@ def per_leg(owner: object, *names: str, finite: bool = True, **widths: int) -> N
             )
         if not (np.isfinite(value) if finite else ~np.isnan(value)).all():
             raise MachineError("not finite", key=name, value=value.tolist())
-        set_frozen(owner, **{name: frozen(np.broadcast_to(value, (count, *tails[name])), name)})
+        set_frozen(owner, **{name: read_only(np.array(np.broadcast_to(value, (count, *tails[name]))))})
 
 
 Part = TypeVar("Part")

@@ -89,9 +89,7 @@ def test_forces_along_a_path_are_those_of_mujoco(name: str, count: int) -> None:
     machine = loaded(name)
     curve, x, u = curves(machine, count, 3)
     forces = Dynamics.of(machine).along(curve).forces(x, u)
-    found = np.array(
-        [by_mujoco(mujoco, machine, [(t[k], a[k]) for t, a in curve], x[k], u[k]) for k in range(count)]
-    )
+    found = np.array([by_mujoco(mujoco, machine, [(t[k], a[k]) for t, a in curve], x[k], u[k]) for k in range(count)])
     assert np.abs(found).max() > 300.0
     np.testing.assert_allclose(forces, found, atol=1e-6, rtol=0.0)
 

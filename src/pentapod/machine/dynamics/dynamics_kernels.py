@@ -56,6 +56,72 @@ def _solve(m: Floats, r: Floats) -> None:
 
 
 @kernel
+def _add_leg(
+    d: Floats,
+    z: float,
+    cylinder: Floats,
+    rod: Floats,
+    moving: float,
+    gravity: Floats,
+    u: Floats,
+    own: Floats,
+    at_p: Floats,
+    at_i: Floats,
+) -> None:
+    """Fill own (3,), what a leg's bodies ask of its own drive, and add to at_p, at_i (3, 3) what they ask across it.
+
+    Rows: A, B and G. d (3, 3): the leg's vector and its derivatives; u (3, 3): filled with its direction and theirs.
+    """
+    square, along, bend, fast, weight = 0.0, 0.0, 0.0, 0.0, 0.0
+    for c in range(3):
+        square += d[0, c] * d[0, c]
+    length = np.sqrt(square)
+    for c in range(3):
+        u[0, c] = d[0, c] / length
+        along += u[0, c] * d[1, c]
+    for c in range(3):
+        u[1, c] = (d[1, c] - along * u[0, c]) / length
+        bend += u[1, c] * d[1, c] + u[0, c] * d[2, c]
+        fast += u[1, c] * u[1, c]
+        weight += gravity[c] * u[0, c]
+    for c in range(3):  # the part of u″ across the leg: along it, it is −|u′|²
+        u[2, c] = (d[2, c] - bend * u[0, c] - 2.0 * along * u[1, c]) / length + fast * u[0, c]
+    once = rod[1] + rod[0] * length
+    twice = cylinder[2] + rod[2] + (2.0 * rod[1] + rod[0] * length) * length
+    own[0] = (moving + rod[0]) * along
+    own[1] = (moving + rod[0]) * bend - once * fast
+    own[2] = -rod[0] * weight
+    for c in range(3):
+        inertia = twice / length * u[1, c]
+        quadratic = (2.0 * once * along * u[1, c] + twice * u[2, c]) / length
+        held = -(cylinder[1] + once) / length * (gravity[c] - weight * u[0, c])
+        at_p[0, c] += inertia
+        at_p[1, c] += quadratic
+        at_p[2, c] += held
+        at_i[0, c] += z * inertia
+        at_i[1, c] += z * quadratic
+        at_i[2, c] += z * held
+
+
+@kernel
+def _spread(e: Floats, z: Floats, t: Floats, tool: float, at_p: Floats, at_i: Floats, m: Floats, r: Floats) -> None:
+    """Fill r (5, 6) with the legs' forces for what acts on p and i (3, 3), and for 1 N along x, y, z on the tip."""
+    for c in range(3):
+        for leg in range(5):
+            m[c, leg] = e[leg, c]
+        for n in range(3):
+            r[c, n] = at_p[n, c]
+            r[c, 3 + n] = 1.0 if n == c else 0.0
+    for j in range(2):
+        for leg in range(5):
+            m[3 + j, leg] = z[leg] * (e[leg, 0] * t[j, 0] + e[leg, 1] * t[j, 1] + e[leg, 2] * t[j, 2])
+        for n in range(3):
+            r[3 + j, n] = at_i[n, 0] * t[j, 0] + at_i[n, 1] * t[j, 1] + at_i[n, 2] * t[j, 2]
+            r[3 + j, 3 + n] = tool * t[j, n]
+    _solve(m, r)
+
+
+@kernel
 def force_terms(
     tips: Floats,
     axes: Floats,
@@ -78,73 +144,49 @@ def force_terms(
     only move with a drive. reach: largest force of a leg for 1 N on the tip.
     """
     p, i, d, u, e = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((5, 3))
-    t, m, r = np.empty((2, 3)), np.empty((5, 5)), np.empty((5, 6))
+    t, m, r, own = np.empty((2, 3)), np.empty((5, 5)), np.empty((5, 6)), np.empty(3)
     at_p, at_i = np.empty((3, 3)), np.empty((3, 3))
     for k in range(tips.shape[1]):
-        for n in range(3):
-            for c in range(3):
+        for c in range(3):
+            for n in range(3):
                 i[n, c] = -axes[n, k, c]
                 p[n, c] = tips[n, k, c] - tool * i[n, c]
-        for c in range(3):
             for n in range(1, 3):
                 at_p[n - 1, c] = platform[0] * p[n, c] + platform[1] * i[n, c]
                 at_i[n - 1, c] = platform[1] * p[n, c] + platform[2] * i[n, c]
             at_p[2, c], at_i[2, c] = -platform[0] * gravity[c], -platform[1] * gravity[c]
         for leg in range(5):
-            z, square, along, bend, fast = offsets[leg], 0.0, 0.0, 0.0, 0.0
+            z = offsets[leg]
             for c in range(3):
                 d[0, c] = p[0, c] + z * i[0, c] - base[leg, c]
                 d[1, c], d[2, c] = p[1, c] + z * i[1, c], p[2, c] + z * i[2, c]
-                square += d[0, c] * d[0, c]
-            length = np.sqrt(square)
-            for c in range(3):
-                u[0, c] = d[0, c] / length
-                e[leg, c] = u[0, c]
-                along += u[0, c] * d[1, c]
-            for c in range(3):
-                u[1, c] = (d[1, c] - along * u[0, c]) / length
-                bend += u[1, c] * d[1, c] + u[0, c] * d[2, c]
-                fast += u[1, c] * u[1, c]
-            # The part of u″ across the leg: along it, it is −|u′|².
-            weight = 0.0
-            for c in range(3):
-                u[2, c] = (d[2, c] - bend * u[0, c] - 2.0 * along * u[1, c]) / length + fast * u[0, c]
-                weight += gravity[c] * u[0, c]
-            mass, once = rods[leg, 0], rods[leg, 1] + rods[leg, 0] * length
-            twice = cylinders[leg, 2] + rods[leg, 2] + (2.0 * rods[leg, 1] + rods[leg, 0] * length) * length
-            terms[0, k, leg] = (moving[leg] + mass) * along
-            terms[1, k, leg] = (moving[leg] + mass) * bend - once * fast
-            terms[2, k, leg] = -mass * weight
-            for c in range(3):
-                across = twice / length * u[1, c]
-                at_p[0, c] += across
-                at_i[0, c] += z * across
-                across = (2.0 * once * along * u[1, c] + twice * u[2, c]) / length
-                at_p[1, c] += across
-                at_i[1, c] += z * across
-                across = -(cylinders[leg, 1] + once) / length * (gravity[c] - weight * u[0, c])
-                at_p[2, c] += across
-                at_i[2, c] += z * across
-        _tangents(i[0], t)
-        r[:] = 0.0
-        for c in range(3):
-            for leg in range(5):
-                m[c, leg] = e[leg, c]
-            r[c, 3 + c] = 1.0
+            _add_leg(d, z, cylinders[leg], rods[leg], moving[leg], gravity, u, own, at_p, at_i)
             for n in range(3):
-                r[c, n] = at_p[n, c]
-        for j in range(2):
-            for leg in range(5):
-                m[3 + j, leg] = offsets[leg] * (e[leg, 0] * t[j, 0] + e[leg, 1] * t[j, 1] + e[leg, 2] * t[j, 2])
-            for c in range(3):
-                r[3 + j, 3 + c] = tool * t[j, c]
-                for n in range(3):
-                    r[3 + j, n] += at_i[n, c] * t[j, c]
-        _solve(m, r)
+                e[leg, n] = u[0, n]
+                terms[n, k, leg] = own[n]
+        _tangents(i[0], t)
+        _spread(e, offsets, t, tool, at_p, at_i, m, r)
         for leg in range(5):
             for n in range(3):
                 terms[n, k, leg] += r[leg, n]
             reach[k, leg] = np.sqrt(r[leg, 3] * r[leg, 3] + r[leg, 4] * r[leg, 4] + r[leg, 5] * r[leg, 5])
+
+
+@kernel
+def _rates(e: Floats, z: Floats, i: Floats, t: Floats, right: Floats, turning: float, m: Floats, r: Floats) -> None:
+    """Fill r (5, 1): the change of p, and of i along t (2, 3), at which the legs' ends move by `right` (5,) along them.
+
+    turning: |i̇|² where these are accelerations; i then also moves by −|i̇|² i.
+    """
+    for leg in range(5):
+        over = 0.0
+        for c in range(3):
+            m[leg, c] = e[leg, c]
+            over += e[leg, c] * i[0, c]
+        for j in range(2):
+            m[leg, 3 + j] = z[leg] * (e[leg, 0] * t[j, 0] + e[leg, 1] * t[j, 1] + e[leg, 2] * t[j, 2])
+        r[leg, 0] = right[leg] + z[leg] * turning * over
+    _solve(m, r)
 
 
 @kernel
@@ -155,7 +197,7 @@ def motion_of_rows(
 
     At [0] they are given. From |d|² = l² with d = p + z i − b: e · ḋ = l̇, e · d̈ = l̈ + (l̇² − |ḋ|²) / l, |i| = 1.
     """
-    p, i, e, length = np.empty((3, 3)), np.empty((3, 3)), np.empty((5, 3)), np.empty(5)
+    p, i, e, length, right = np.empty((3, 3)), np.empty((3, 3)), np.empty((5, 3)), np.empty(5), np.empty(5)
     t, m, r = np.empty((2, 3)), np.empty((5, 5)), np.empty((5, 1))
     for k in range(tips.shape[1]):
         for c in range(3):
@@ -163,32 +205,22 @@ def motion_of_rows(
             p[0, c] = tips[0, k, c] - tool * i[0, c]
         _tangents(i[0], t)
         for leg in range(5):
-            square = 0.0
             for c in range(3):
                 e[leg, c] = p[0, c] + offsets[leg] * i[0, c] - base[leg, c]
-                square += e[leg, c] * e[leg, c]
-            length[leg] = np.sqrt(square)
-            for c in range(3):
-                e[leg, c] /= length[leg]
+            length[leg] = np.sqrt(e[leg, 0] ** 2 + e[leg, 1] ** 2 + e[leg, 2] ** 2)
+            e[leg] /= length[leg]
+            right[leg] = rates[k, leg]
         turning = 0.0
         for n in range(1, 3):
-            for leg in range(5):
-                z, moved, over = offsets[leg], 0.0, 0.0
-                for c in range(3):
-                    m[leg, c] = e[leg, c]
-                    moved += (p[1, c] + z * i[1, c]) ** 2 if n == 2 else 0.0
-                    over += e[leg, c] * i[0, c]
-                for j in range(2):
-                    m[leg, 3 + j] = z * (e[leg, 0] * t[j, 0] + e[leg, 1] * t[j, 1] + e[leg, 2] * t[j, 2])
-                if n == 1:
-                    r[leg, 0] = rates[k, leg]
-                else:
-                    r[leg, 0] = accelerations[k, leg] + (rates[k, leg] ** 2 - moved) / length[leg] + z * turning * over
-            _solve(m, r)
+            _rates(e, offsets, i, t, right, turning, m, r)
             for c in range(3):
                 p[n, c] = r[c, 0]
-                i[n, c] = r[3, 0] * t[0, c] + r[4, 0] * t[1, c] - (turning * i[0, c] if n == 2 else 0.0)
+                i[n, c] = r[3, 0] * t[0, c] + r[4, 0] * t[1, c] - turning * i[0, c]
                 axes[n, k, c] = -i[n, c]
                 tips[n, k, c] = p[n, c] + tool * i[n, c]
-            if n == 1:
-                turning = i[1, 0] ** 2 + i[1, 1] ** 2 + i[1, 2] ** 2
+            turning = i[1, 0] ** 2 + i[1, 1] ** 2 + i[1, 2] ** 2
+            for leg in range(5):
+                z, moved = offsets[leg], 0.0
+                for c in range(3):
+                    moved += (p[1, c] + z * i[1, c]) ** 2
+                right[leg] = accelerations[k, leg] + (rates[k, leg] ** 2 - moved) / length[leg]
