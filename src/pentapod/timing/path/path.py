@@ -80,6 +80,11 @@ class PathDerivatives(Value):
         return tuple(self.piece.derivatives(self.s, self.order)[1:])
 
     @cached_property
+    def poses(self) -> tuple[tuple[Floats, Floats], ...]:
+        """Tip and tool axis (n, 3), and their derivatives of orders 1 and 2."""
+        return tuple(self.piece.pose(self.s, k) for k in range(3))
+
+    @cached_property
     def tip(self) -> tuple[Floats, ...]:
         """The tip's derivatives, (n, 3) each."""
         return tuple(self.piece.pose(self.s, k)[0] for k in range(1, self.order + 1))
