@@ -1,4 +1,4 @@
-"""The drives' forces as a limit of the time law: kept by the law and its setpoints, named, refused where none is left."""
+"""The drives' forces as a limit of the time law: kept by law and setpoints, named, refused where none is left."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def zigzag(feed: float = 0.15, kind: SegmentKind = SegmentKind.CUT):
 
     def tips(s):
         p, *rest = tip(s)
-        return p + [0.085, -0.017, 0.467 - 0.9], *rest
+        return p + np.array([0.085, -0.017, 0.467 - 0.9]), *rest
 
     def axes(s):
         z = np.zeros((len(s), 3))
@@ -40,12 +40,7 @@ def zigzag(feed: float = 0.15, kind: SegmentKind = SegmentKind.CUT):
         return DESK.robot.leg_derivatives(list(zip(tips(s), axes(s), strict=True)), DESK.tool_length)
 
     legs.tool = tips, axes
-    piece.section_kinds = (kind,)
-    return replace_legs(piece, legs)
-
-
-def replace_legs(piece, legs):
-    piece.legs = legs
+    piece.section_kinds, piece.legs = (kind,), legs
     return piece
 
 

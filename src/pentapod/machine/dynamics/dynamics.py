@@ -69,8 +69,8 @@ class Dynamics(Value):
 
         tips, axes = np.zeros((2, 3, len(position), 3))
         tips[0], axes[0] = position + self.machine.tool_length * direction, -direction
-        legs = (np.require(y, np.float64, ["C", "W"]) for y in (rates, accelerations))
-        motion_of_rows(*legs, *self._robot, tips, axes)
+        base, offsets, tool = self._robot
+        motion_of_rows(read_only(rates), read_only(accelerations), base, offsets, tool, tips, axes)
         return self._terms(tips, axes)
 
     @property
@@ -81,8 +81,9 @@ class Dynamics(Value):
     def _terms(self, tips: Floats, axes: Floats) -> ForceTerms:
         from pentapod.machine.dynamics.dynamics_kernels import force_terms  # noqa: PLC0415 - loads numba
 
-        terms, reach = np.empty((3, tips.shape[1], len(self.rods))), np.empty((tips.shape[1], len(self.rods)))
-        bodies = (read_only(y) for y in (self.platform, self.cylinders, self.rods))
-        moving, gravity = self.machine.drives.moving_mass, self.machine.masses.gravity
-        force_terms(tips, axes, *self._robot, *bodies, read_only(moving), read_only(gravity), terms, reach)
+        base, offsets, tool = self._robot
+        platform, cylinders, rods = read_only(self.platform), read_only(self.cylinders), read_only(self.rods)
+        moving, gravity = read_only(self.machine.drives.moving_mass), read_only(self.machine.masses.gravity)
+        terms, reach = np.empty((3, tips.shape[1], len(rods))), np.empty((tips.shape[1], len(rods)))
+        force_terms(tips, axes, base, offsets, tool, platform, cylinders, rods, moving, gravity, terms, reach)
         return ForceTerms(*terms, reach)
