@@ -13,6 +13,9 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.numerics.kernels import kernel
 
+LEGS = 5
+"""As many as the freedoms of a line: three of a point on it, two of its direction."""
+
 
 @kernel
 def _tangents(i: Floats, t: Floats) -> None:
@@ -31,7 +34,7 @@ def _tangents(i: Floats, t: Floats) -> None:
 @kernel
 def _solve(m: Floats, r: Floats) -> None:
     """Replace r (5, c) by the solution of m x = r, m (5, 5) by its factors; not finite where m is singular."""
-    n, columns = 5, r.shape[1]
+    n, columns = LEGS, r.shape[1]
     for k in range(n):
         pivot = k
         for j in range(k + 1, n):
@@ -107,13 +110,13 @@ def _add_leg(
 def _spread(e: Floats, z: Floats, t: Floats, tool: float, at_p: Floats, at_i: Floats, m: Floats, r: Floats) -> None:
     """Fill r (5, 6) with the legs' forces for what acts on p and i (3, 3), and for 1 N along x, y, z on the tip."""
     for c in range(3):
-        for leg in range(5):
+        for leg in range(LEGS):
             m[c, leg] = e[leg, c]
         for n in range(3):
             r[c, n] = at_p[n, c]
             r[c, 3 + n] = 1.0 if n == c else 0.0
     for j in range(2):
-        for leg in range(5):
+        for leg in range(LEGS):
             m[3 + j, leg] = z[leg] * (e[leg, 0] * t[j, 0] + e[leg, 1] * t[j, 1] + e[leg, 2] * t[j, 2])
         for n in range(3):
             r[3 + j, n] = at_i[n, 0] * t[j, 0] + at_i[n, 1] * t[j, 1] + at_i[n, 2] * t[j, 2]
@@ -143,8 +146,8 @@ def force_terms(
     of a cylinder about the base joint, of a rod about the platform joint, towards the platform. moving (5,): kg that
     only move with a drive. reach: largest force of a leg for 1 N on the tip.
     """
-    p, i, d, u, e = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((5, 3))
-    t, m, r, own = np.empty((2, 3)), np.empty((5, 5)), np.empty((5, 6)), np.empty(3)
+    p, i, d, u, e = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((LEGS, 3))
+    t, m, r, own = np.empty((2, 3)), np.empty((LEGS, LEGS)), np.empty((LEGS, 6)), np.empty(3)
     at_p, at_i = np.empty((3, 3)), np.empty((3, 3))
     for k in range(tips.shape[1]):
         for c in range(3):
@@ -155,7 +158,7 @@ def force_terms(
                 at_p[n - 1, c] = platform[0] * p[n, c] + platform[1] * i[n, c]
                 at_i[n - 1, c] = platform[1] * p[n, c] + platform[2] * i[n, c]
             at_p[2, c], at_i[2, c] = -platform[0] * gravity[c], -platform[1] * gravity[c]
-        for leg in range(5):
+        for leg in range(LEGS):
             z = offsets[leg]
             for c in range(3):
                 d[0, c] = p[0, c] + z * i[0, c] - base[leg, c]
@@ -166,7 +169,7 @@ def force_terms(
                 terms[n, k, leg] = own[n]
         _tangents(i[0], t)
         _spread(e, offsets, t, tool, at_p, at_i, m, r)
-        for leg in range(5):
+        for leg in range(LEGS):
             for n in range(3):
                 terms[n, k, leg] += r[leg, n]
             reach[k, leg] = np.sqrt(r[leg, 3] * r[leg, 3] + r[leg, 4] * r[leg, 4] + r[leg, 5] * r[leg, 5])
@@ -178,7 +181,7 @@ def _rates(e: Floats, z: Floats, i: Floats, t: Floats, right: Floats, turning: f
 
     turning: |i̇|² where these are accelerations; i then also moves by −|i̇|² i.
     """
-    for leg in range(5):
+    for leg in range(LEGS):
         over = 0.0
         for c in range(3):
             m[leg, c] = e[leg, c]
@@ -197,14 +200,14 @@ def motion_of_rows(
 
     At [0] they are given. From |d|² = l² with d = p + z i − b: e · ḋ = l̇, e · d̈ = l̈ + (l̇² − |ḋ|²) / l, |i| = 1.
     """
-    p, i, e, length, right = np.empty((3, 3)), np.empty((3, 3)), np.empty((5, 3)), np.empty(5), np.empty(5)
-    t, m, r = np.empty((2, 3)), np.empty((5, 5)), np.empty((5, 1))
+    p, i, e, length, right = np.empty((3, 3)), np.empty((3, 3)), np.empty((LEGS, 3)), np.empty(LEGS), np.empty(LEGS)
+    t, m, r = np.empty((2, 3)), np.empty((LEGS, LEGS)), np.empty((LEGS, 1))
     for k in range(tips.shape[1]):
         for c in range(3):
             i[0, c] = -axes[0, k, c]
             p[0, c] = tips[0, k, c] - tool * i[0, c]
         _tangents(i[0], t)
-        for leg in range(5):
+        for leg in range(LEGS):
             for c in range(3):
                 e[leg, c] = p[0, c] + offsets[leg] * i[0, c] - base[leg, c]
             length[leg] = np.sqrt(e[leg, 0] ** 2 + e[leg, 1] ** 2 + e[leg, 2] ** 2)
@@ -219,7 +222,7 @@ def motion_of_rows(
                 axes[n, k, c] = -i[n, c]
                 tips[n, k, c] = p[n, c] + tool * i[n, c]
             turning = i[1, 0] ** 2 + i[1, 1] ** 2 + i[1, 2] ** 2
-            for leg in range(5):
+            for leg in range(LEGS):
                 z, moved = offsets[leg], 0.0
                 for c in range(3):
                     moved += (p[1, c] + z * i[1, c]) ** 2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -41,8 +41,7 @@ class RowForces(Value):
 
         cuts (N,): the rows that cut.
         """
-        found = cls(*(np.empty(program.legs.shape) for _ in range(5)))
-        dynamics, forces, last = Dynamics.of(machine), machine.drive_forces, len(program.legs) - 1
+        found, last = cls(*(np.empty(program.legs.shape) for _ in range(5))), len(program.legs) - 1
         for part in blocks(last + 1, ROWS_AT_ONCE):
             low, high = max(part.start - 1, 0), min(part.stop, last)  # one row more on each side
             near, own = slice(low, high + 1), slice(part.start - low, part.stop - low)
@@ -50,14 +49,24 @@ class RowForces(Value):
             rates = legs.first
             if slopes is None:  # the rate jumps at the row: the mean of both sides
                 rates = 0.5 * (rates + np.append(rates[1:], np.zeros_like(rates[:1]), axis=0))
-            rates = rates[own]
-            terms = dynamics.of_rows(poses[0][part], poses[1][part], rates, legs.second[own])
-            needed, friction = terms.quadratic + terms.weight, forces.friction(rates)
-            found.push[part], found.motion[part] = needed + np.sign(rates) * friction, terms.quadratic
-            found.cutting[part] = machine.cutting_force * terms.reach * cuts[part, None]
-            found.asked[part] = np.abs(needed) + friction + found.cutting[part]
-            found.available[part] = np.maximum(forces.available(rates), np.finfo(float).tiny)
+            poses_there = poses[0][part], poses[1][part]
+            here = cls.at(machine, poses_there, rates[own], legs.second[own], cuts[part])
+            for item in fields(cls):
+                getattr(found, item.name)[part] = getattr(here, item.name)
         return found
+
+    @classmethod
+    def at(
+        cls, machine: Machine, poses: tuple[Floats, Floats], rates: Floats, accelerations: Floats, cuts: Bools
+    ) -> RowForces:
+        """Return the forces of legs that move so, m/s and m/s² (N, n_legs), in poses (N, 3)."""
+        forces, terms = machine.drive_forces, Dynamics.of(machine).of_rows(*poses, rates, accelerations)
+        needed, friction = terms.quadratic + terms.weight, forces.friction(rates)
+        cutting = machine.cutting_force * terms.reach * cuts[:, None]
+        return cls(
+            needed + np.sign(rates) * friction, terms.quadratic, np.abs(needed) + friction + cutting, cutting,
+            np.maximum(forces.available(rates), np.finfo(float).tiny),
+        )  # fmt: skip
 
     @property
     def motion_shares(self) -> Floats:
