@@ -172,7 +172,10 @@ def force_terms(
         for leg in range(LEGS):
             for n in range(3):
                 terms[n, k, leg] += r[leg, n]
-            reach[k, leg] = np.sqrt(r[leg, 3] * r[leg, 3] + r[leg, 4] * r[leg, 4] + r[leg, 5] * r[leg, 5])
+            square = 0.0
+            for c in range(3):
+                square += r[leg, 3 + c] * r[leg, 3 + c]
+            reach[k, leg] = np.sqrt(square)
 
 
 @kernel

@@ -41,7 +41,7 @@ class RowForces(Value):
 
         cuts (N,): the rows that cut.
         """
-        found, last = cls(*(np.empty(program.legs.shape) for _ in range(5))), len(program.legs) - 1
+        found, last = cls(*(np.empty(program.legs.shape) for _ in fields(cls))), len(program.legs) - 1
         for part in blocks(last + 1, ROWS_AT_ONCE):
             low, high = max(part.start - 1, 0), min(part.stop, last)  # one row more on each side
             near, own = slice(low, high + 1), slice(part.start - low, part.stop - low)
