@@ -55,12 +55,14 @@ class Dynamics(Value):
             np.array([leg_rod(machine, leg).moments for leg in legs]),
         )
 
-    def along(self, curve: Sequence[tuple[Floats, Floats]]) -> ForceTerms:
+    def along(self, curve: Sequence[tuple[Floats, Floats]], *, reach: bool = True) -> ForceTerms:
         """Return the terms along a curve: tip and tool axis (n, 3), and their first and second derivatives by s."""
         tips, axes = (np.array([poses[k] for poses in curve[:3]]) for k in range(2))
-        return self._terms(tips, axes)
+        return self._terms(tips, axes, reach)
 
-    def of_rows(self, position: Floats, direction: Floats, rates: Floats, accelerations: Floats) -> ForceTerms:
+    def of_rows(
+        self, position: Floats, direction: Floats, rates: Floats, accelerations: Floats, *, reach: bool = True
+    ) -> ForceTerms:
         """Return the terms by time of legs (n, n_legs) that move so in poses (n, 3); their forces are those at x = 1.
 
         rates in m/s, accelerations in m/s².
@@ -71,19 +73,20 @@ class Dynamics(Value):
         tips[0], axes[0] = position + self.machine.tool_length * direction, -direction
         base, offsets, tool = self._robot
         motion_of_rows(read_only(rates), read_only(accelerations), base, offsets, tool, tips, axes)
-        return self._terms(tips, axes)
+        return self._terms(tips, axes, reach)
 
     @property
     def _robot(self) -> tuple[Floats, Floats, float]:
         robot = self.machine.robot
         return read_only(robot.base_joints), read_only(robot.offsets), self.machine.tool_length
 
-    def _terms(self, tips: Floats, axes: Floats) -> ForceTerms:
+    def _terms(self, tips: Floats, axes: Floats, asked: bool) -> ForceTerms:
         from pentapod.machine.dynamics.dynamics_kernels import force_terms  # noqa: PLC0415 - loads numba
 
         base, offsets, tool = self._robot
         platform, cylinders, rods = read_only(self.platform), read_only(self.cylinders), read_only(self.rods)
         moving, gravity = read_only(self.machine.drives.moving_mass), read_only(self.machine.masses.gravity)
-        terms, reach = np.empty((3, tips.shape[1], len(rods))), np.empty((tips.shape[1], len(rods)))
+        count = tips.shape[1]
+        terms, reach = np.empty((3, count, len(rods))), np.empty((count if asked else 0, len(rods)))
         force_terms(tips, axes, base, offsets, tool, platform, cylinders, rods, moving, gravity, terms, reach)
-        return ForceTerms(*terms, reach)
+        return ForceTerms(terms[0], terms[1], terms[2], reach)

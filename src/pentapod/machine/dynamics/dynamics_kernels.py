@@ -108,19 +108,25 @@ def _add_leg(
 
 @kernel
 def _spread(e: Floats, z: Floats, t: Floats, tool: float, at_p: Floats, at_i: Floats, m: Floats, r: Floats) -> None:
-    """Fill r (5, 6) with the legs' forces for what acts on p and i (3, 3), and for 1 N along x, y, z on the tip."""
+    """Fill r (5, 6) with the legs' forces for what acts on p and i (3, 3), and for 1 N along x, y, z on the tip.
+
+    With three columns, the last three are left out.
+    """
+    for_tip = r.shape[1] > 3
     for c in range(3):
         for leg in range(LEGS):
             m[c, leg] = e[leg, c]
         for n in range(3):
             r[c, n] = at_p[n, c]
-            r[c, 3 + n] = 1.0 if n == c else 0.0
+            if for_tip:
+                r[c, 3 + n] = 1.0 if n == c else 0.0
     for j in range(2):
         for leg in range(LEGS):
             m[3 + j, leg] = z[leg] * (e[leg, 0] * t[j, 0] + e[leg, 1] * t[j, 1] + e[leg, 2] * t[j, 2])
         for n in range(3):
             r[3 + j, n] = at_i[n, 0] * t[j, 0] + at_i[n, 1] * t[j, 1] + at_i[n, 2] * t[j, 2]
-            r[3 + j, 3 + n] = tool * t[j, n]
+            if for_tip:
+                r[3 + j, 3 + n] = tool * t[j, n]
     _solve(m, r)
 
 
@@ -144,10 +150,11 @@ def force_terms(
     tips, axes (3, n, 3): tip and tool axis (tip → spindle), and their first two derivatives by s. tool: metres from p
     to the tip. platform (3,), cylinders, rods (5, 3): moments of the masses, of the platform about p along the line,
     of a cylinder about the base joint, of a rod about the platform joint, towards the platform. moving (5,): kg that
-    only move with a drive. reach: largest force of a leg for 1 N on the tip.
+    only move with a drive. reach: largest force of a leg for 1 N on the tip; (0, 5) where it is not asked for.
     """
     p, i, d, u, e = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((LEGS, 3))
-    t, m, r, own = np.empty((2, 3)), np.empty((LEGS, LEGS)), np.empty((LEGS, 6)), np.empty(3)
+    t, m, own = np.empty((2, 3)), np.empty((LEGS, LEGS)), np.empty(3)
+    r = np.empty((LEGS, 6 if len(reach) else 3))
     at_p, at_i = np.empty((3, 3)), np.empty((3, 3))
     for k in range(tips.shape[1]):
         for c in range(3):
@@ -172,10 +179,11 @@ def force_terms(
         for leg in range(LEGS):
             for n in range(3):
                 terms[n, k, leg] += r[leg, n]
-            square = 0.0
-            for c in range(3):
-                square += r[leg, 3 + c] * r[leg, 3 + c]
-            reach[k, leg] = np.sqrt(square)
+            if len(reach):
+                square = 0.0
+                for c in range(3):
+                    square += r[leg, 3 + c] * r[leg, 3 + c]
+                reach[k, leg] = np.sqrt(square)
 
 
 @kernel

@@ -53,7 +53,7 @@ class LegForce(MachineLimit):
 
     def acceleration_rows(self, path: PathDerivatives) -> AccelerationRows:
         """Return the rows (n, k legs): one for each leg, more where what a drive has depends on its velocity."""
-        terms, forces = self.dynamics.along(path.poses), self._forces
+        terms, forces = self._along(path), self._forces
         cutting = self._cutting(path.piece, path.s, terms)
         room, fall = self.limit - forces.coulomb_friction - cutting, self.kept * forces.fall
         rows = [self._rows(path, terms, room, forces.viscous_friction)]
@@ -83,7 +83,7 @@ class LegForce(MachineLimit):
 
     def share(self, path: PathDerivatives, motion: Motion) -> Floats:
         """Return the shares (n, legs) of what weight, friction and cutting leave of the drives' forces."""
-        terms, rates = self.dynamics.along(path.poses), path.legs[0] * motion.v[:, None]
+        terms, rates = self._along(path), path.legs[0] * motion.v[:, None]
         room = self._room(rates, self._cutting(path.piece, path.s, terms), self.kept)
         pushes = terms.inertia * motion.u[:, None] + terms.quadratic * motion.x[:, None]
         return share_of_room(pushes / room, terms.weight / room)
@@ -106,7 +106,7 @@ class LegForce(MachineLimit):
 
     def at_rest(self, path: PathDerivatives, index: int, row: int) -> str:
         """Return what a leg must hold at rest at a station, in words."""
-        terms, leg = self.dynamics.along(path.poses), row % len(self.limit)
+        terms, leg = self._along(path), row % len(self.limit)
         cutting = self._cutting(path.piece, path.s, terms)
         weight, parts = float(np.abs(terms.weight[index, leg])), [f"{abs(terms.weight[index, leg]):.4g} N of weight"]
         friction = float(self._forces.coulomb_friction[leg])
@@ -123,6 +123,9 @@ class LegForce(MachineLimit):
     def _forces(self) -> DriveForces:
         return self._machine.drive_forces
 
+    def _along(self, path: PathDerivatives) -> ForceTerms:
+        return path.force_terms(self.dynamics, reach=self._machine.cutting_force > 0.0)
+
     def _of_rows(self, setpoints: InterpolatedSetpoints) -> tuple[ForceTerms, Floats, Floats]:
         """Return the terms by time at the rows, the legs' rates (rows, legs), and what cutting needs of them."""
         rows, own, legs = setpoints.rows, setpoints.own_rows, setpoints.legs
@@ -131,7 +134,8 @@ class LegForce(MachineLimit):
             rates = 0.5 * (rates + np.append(rates[1:], np.zeros_like(rates[:1]), axis=0))
         tips, axes = np.asarray(rows.tips)[own], np.asarray(rows.axes)[own]
         position = tips + self._machine.tool_length * axes
-        terms = self.dynamics.of_rows(position, -axes, rates[own], legs.second[own])
+        reach = self._machine.cutting_force > 0.0
+        terms = self.dynamics.of_rows(position, -axes, rates[own], legs.second[own], reach=reach)
         return terms, rates[own], self._cutting(setpoints.piece, rows.stations[own], terms)
 
     def _room(self, rates: Floats, cutting: Floats, kept: float) -> Floats:
@@ -143,7 +147,7 @@ class LegForce(MachineLimit):
         """Return the force (n, legs) that the cutting force may ask of the drives at stations, on cuts and at ends."""
         force = self._machine.cutting_force
         if force == 0.0:
-            return np.zeros_like(terms.reach)
+            return np.zeros_like(terms.weight)
         cuts = np.append([kind == SegmentKind.CUT for kind in piece.section_kinds], False)
         ends = np.asarray(piece.section_ends)
         here: Bools = cuts[np.searchsorted(ends, s, "left")] | cuts[np.searchsorted(ends, s, "right")]

@@ -60,9 +60,10 @@ class RowForces(Value):
         cls, machine: Machine, poses: tuple[Floats, Floats], rates: Floats, accelerations: Floats, cuts: Bools
     ) -> RowForces:
         """Return the forces of legs that move so, m/s and m/s² (N, n_legs), in poses (N, 3)."""
-        forces, terms = machine.drive_forces, Dynamics.of(machine).of_rows(*poses, rates, accelerations)
+        force, forces = machine.cutting_force, machine.drive_forces
+        terms = Dynamics.of(machine).of_rows(*poses, rates, accelerations, reach=force > 0.0)
         needed, friction = terms.quadratic + terms.weight, forces.friction(rates)
-        cutting = machine.cutting_force * terms.reach * cuts[:, None]
+        cutting = force * terms.reach * cuts[:, None] if force > 0.0 else np.zeros_like(needed)
         return cls(
             needed + np.sign(rates) * friction, terms.quadratic, np.abs(needed) + friction + cutting, cutting,
             np.maximum(forces.available(rates), np.finfo(float).tiny),
