@@ -9,7 +9,7 @@ from timing_paths import Path, raster
 from pentapod.base.refusal import Refusal
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine import DriveForces, Dynamics, Machine
-from pentapod.timing import Trajectory, certify, explain, retime
+from pentapod.timing import Trajectory, certify, explain, override, retime
 from pentapod.toolpath.toolpath import SegmentKind
 
 DESK = Machine.load("desk")
@@ -120,3 +120,12 @@ def test_drives_that_cannot_hold_the_machine_are_refused_with_leg_place_and_newt
 
 def test_machines_without_a_peak_force_have_no_such_limit() -> None:
     assert not [use for use in certify(timed(zigzag(), DESK), DESK) if use.quantity == "leg force"]
+
+
+def test_an_override_keeps_the_peak_force() -> None:
+    machine = strong()
+    trajectory = timed(zigzag(), machine)
+    for share in (0.0, 0.5, 1.5):
+        turned = override(trajectory, machine, 0.3, share)
+        assert isinstance(turned, Trajectory), str(turned)
+        assert np.abs(rows(turned, machine)[0][2:-2]).max() <= 400.0 * 1.001
