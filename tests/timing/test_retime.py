@@ -408,8 +408,8 @@ def test_retime_margin_leaves_room():
     assert 0.78 < a < 0.95
 
 
-def test_retime_asks_a_machine_for_four_attributes_only():
-    """Timing asks a machine for the limits of legs and tool, its rapid rate and its controller, and nothing else."""
+def test_retime_asks_a_machine_for_five_attributes_only():
+    """Timing asks a machine for the limits of legs, drives and tool, its rapid rate and controller, and no more."""
     m = machine()
     assert isinstance(m, SimpleNamespace)
-    assert set(vars(m)) == {"legs", "rapid_velocity", "controller", "tool_limits"}
+    assert set(vars(m)) == {"legs", "rapid_velocity", "controller", "tool_limits", "drive_forces"}

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from pentapod.machine.drives import DriveForces
 from pentapod.machine.parts import ControllerSettings, LegLimits, ToolLimits
 from pentapod.toolpath.toolpath import SegmentKind
 
@@ -18,7 +19,8 @@ OFFSETS = 0.4 * BASE[:, 0]
 def machine(v=0.5, a=5.0, rapid=0.3, period=1e-3, interpolation="linear", **tool):
     legs = LegLimits(*(np.broadcast_to(np.asarray(x, float), (5,)) for x in (0.1, 2.0, v, a, 200.0)))
     controller = ControllerSettings(period, interpolation)
-    return SimpleNamespace(legs=legs, rapid_velocity=rapid, controller=controller, tool_limits=ToolLimits(**tool))
+    limits = {"tool_limits": ToolLimits(**tool), "drive_forces": DriveForces()}
+    return SimpleNamespace(legs=legs, rapid_velocity=rapid, controller=controller, **limits)
 
 
 @dataclass

@@ -17,7 +17,7 @@ _TO_SI: dict[str, Callable[[Any], Any]] = {
     "deg_mm": lambda x: np.radians(x) / 1e-3,
     "per_mm": lambda x: x * 1000.0,
     "n_um": lambda x: x * 1e6,
-    **dict.fromkeys(("s", "per_s", "kg", "n", "m_s2"), lambda x: x),
+    **dict.fromkeys(("s", "per_s", "kg", "n", "n_s_m", "m_s2"), lambda x: x),
 }
 _FROM_SI: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("mm", "mm_s", "mm_s2", "mm_s3", "ms"), lambda x: x * 1000.0),

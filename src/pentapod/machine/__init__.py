@@ -22,8 +22,11 @@ if TYPE_CHECKING:
     from pentapod.machine.clearance.leg_clearance import clearances as clearances
     from pentapod.machine.clearance.leg_clearance import pair_names as pair_names
     from pentapod.machine.clearance.leg_clearance import segment_distance as segment_distance
+    from pentapod.machine.drives import DriveForces as DriveForces
     from pentapod.machine.drives import Drives as Drives
     from pentapod.machine.drives import Masses as Masses
+    from pentapod.machine.dynamics.dynamics import Dynamics as Dynamics
+    from pentapod.machine.dynamics.dynamics import ForceTerms as ForceTerms
     from pentapod.machine.identification.calibration import Calibration as Calibration
     from pentapod.machine.identification.calibration import calibrate as calibrate
     from pentapod.machine.identification.identification import Identified as Identified
@@ -65,7 +68,8 @@ _HOMES = {
     "machine.calibration.record": "CalibrationFit CalibrationRecord MeasuredGeometry geometry_digest",
     "machine.clearance.collision_world": "NOTHING CollisionWorld Obstacle",
     "machine.clearance.leg_clearance": "clearances pair_names segment_distance",
-    "machine.drives": "Drives Masses",
+    "machine.drives": "DriveForces Drives Masses",
+    "machine.dynamics.dynamics": "Dynamics ForceTerms",
     "machine.identification.calibration": "Calibration calibrate",
     "machine.identification.identification": "Identified identify",
     "machine.identification.measurements": "Frame Instrument Measurements",

@@ -1,7 +1,8 @@
-"""Drives and masses: numbers for simulation, on which no program depends."""
+"""Drives and masses: numbers for simulation, and for programs where the drives' forces are limited."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -68,8 +69,79 @@ class Drives(Value):
 
 
 @dataclass(frozen=True, eq=False)
+class DriveForces(Value):
+    """The force that each drive has, and the friction that takes part of it; infinite where there is no limit.
+
+    A drive has its peak force up to the knee; from there on it falls linearly to 0 at the no-load velocity. Friction
+    always counts against the drive: the help that it is in braking is not used. Arrays (n,), where scalars hold for all
+    legs: N, m/s, and N·s/m for the viscous friction. Raises MachineError.
+    """
+
+    peak_force: Annotated[
+        Floats, Key("n", "largest force of a drive; with it masses and drives belong to the machine", kind=PER_LEG)
+    ] = field(default_factory=each_leg(math.inf))
+    continuous_force: Annotated[
+        Floats, Key("n", "force that a drive bears all the time, root mean square", kind=PER_LEG)
+    ] = field(default_factory=each_leg(math.inf))
+    knee_velocity: Annotated[
+        Floats, Key("mm_s", "leg velocity up to which a drive has its peak force; 0: it falls from rest", kind=PER_LEG)
+    ] = field(default_factory=each_leg(0.0))
+    no_load_velocity: Annotated[
+        Floats, Key("mm_s", "leg velocity at which no force is left; without it velocity costs none", kind=PER_LEG)
+    ] = field(default_factory=each_leg(math.inf))
+    coulomb_friction: Annotated[
+        Floats, Key("n", "friction of a leg that moves, whatever its velocity", kind=PER_LEG)
+    ] = field(default_factory=each_leg(0.0))
+    viscous_friction: Annotated[
+        Floats, Key("n_s_m", "friction of a leg in proportion to its velocity", kind=PER_LEG)
+    ] = field(default_factory=each_leg(0.0))
+
+    def __post_init__(self) -> None:
+        per_leg(self, *self.__dataclass_fields__, finite=False)
+        for name, values in vars(self).items():
+            zero = name in ("knee_velocity", "coulomb_friction", "viscous_friction")
+            if not (np.isfinite(values) & (values >= 0.0) if zero else values > 0.0).all():
+                what = "must not be negative" if zero else "must be positive"
+                raise MachineError(what, key=name, value=values.tolist())
+        for name, least, than in (
+            ("no_load_velocity", self.knee_velocity, "knee_velocity"),
+            ("peak_force", np.where(np.isinf(self.continuous_force), 0.0, self.continuous_force), "continuous_force"),
+        ):
+            values = getattr(self, name)
+            if not (values > least if than == "knee_velocity" else values >= least).all():
+                expected = f"{'more than' if than == 'knee_velocity' else 'at least'} {than}, {least.tolist()}"
+                raise MachineError("too small", key=name, value=values.tolist(), expected=expected)
+        if not self.limited and (np.isfinite(self.continuous_force) | np.isfinite(self.no_load_velocity)).any():
+            raise MachineError("needs the peak force", key="peak_force", expected="a force for each drive, newtons")
+
+    @property
+    def limited(self) -> bool:
+        """Whether the forces are limited: then programs depend on drives and masses."""
+        return bool(np.isfinite(self.peak_force).any())
+
+    @property
+    def fall(self) -> Floats:
+        """Force (n,) that is lost for each m/s beyond the knee, N·s/m."""
+        return np.where(
+            np.isfinite(self.no_load_velocity), self.peak_force / (self.no_load_velocity - self.knee_velocity), 0.0
+        )
+
+    def available(self, rates: Floats) -> Floats:
+        """Return the force (N, n) of the drives at rates of the legs (N, n), m/s."""
+        return self.peak_force - self.fall * np.maximum(np.abs(rates) - self.knee_velocity, 0.0)
+
+    def friction(self, rates: Floats) -> Floats:
+        """Return the largest friction (N, n) at rates of the legs (N, n), m/s; that of a leg at rest counts in full."""
+        return self.coulomb_friction + self.viscous_friction * np.abs(rates)
+
+    def given(self) -> dict[str, Floats]:
+        """Return what is given, by name, with infinite values as −1; nothing where the forces are not limited."""
+        return {name: np.where(np.isinf(y), -1.0, y) for name, y in vars(self).items()} if self.limited else {}
+
+
+@dataclass(frozen=True, eq=False)
 class Masses(Value):
-    """Masses for `pentapod simulate --engine mujoco`.
+    """Masses for `pentapod simulate --engine mujoco`, and for machines whose drives have a peak force.
 
     platform: of the spindle with all that it carries, spread along the platform line. gravity (3,): m/s², machine
     frame. Raises MachineError.

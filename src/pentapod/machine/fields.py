@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo
 from pydantic_core import PydanticCustomError
 
-from pentapod.base.arrays import Floats, frozen, set_frozen
+from pentapod.base.arrays import Floats, read_only, set_frozen
 from pentapod.base.errors import MachineError
 from pentapod.kinematics.five_legs import FiveLegs
 
@@ -27,11 +27,11 @@ def each_leg(value: float | list[float]) -> Callable[[], Floats]:
     return lambda: np.array([value])
 
 
-def per_leg(owner: object, *names: str, **widths: int) -> None:
+def per_leg(owner: object, *names: str, finite: bool = True, **widths: int) -> None:
     """Replace fields by read-only arrays with an entry for each leg: (n,), or (n, width) for those with a width.
 
-    One entry counts for all legs; where every field has only one, n is that of a linear pentapod. Raises MachineError
-    naming the field.
+    finite: whether infinite entries are errors. One entry counts for all legs; where every field has only one, n is
+    that of a linear pentapod. Raises MachineError naming the field.
     """
     tails: dict[str, tuple[int, ...]] = dict.fromkeys(names, ())
     tails |= {name: (width,) for name, width in widths.items()}
@@ -43,9 +43,9 @@ def per_leg(owner: object, *names: str, **widths: int) -> None:
             raise MachineError(
                 "wrong count", key=name, value=value.shape, expected=f"one for all legs, or one for each of {count}"
             )
-        if not np.isfinite(value).all():
+        if not (np.isfinite(value) if finite else ~np.isnan(value)).all():
             raise MachineError("not finite", key=name, value=value.tolist())
-        set_frozen(owner, **{name: frozen(np.broadcast_to(value, (count, *tails[name])), name)})
+        set_frozen(owner, **{name: read_only(np.array(np.broadcast_to(value, (count, *tails[name]))))})
 
 
 Part = TypeVar("Part")

@@ -21,7 +21,7 @@ from pentapod.kinematics.robot import Robot
 from pentapod.machine import reader
 from pentapod.machine.bars import Bars, PassiveLimb
 from pentapod.machine.calibration.digest import digest_of
-from pentapod.machine.drives import Drives, Masses
+from pentapod.machine.drives import DriveForces, Drives, Masses
 from pentapod.machine.fields import for_legs, positive
 from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
@@ -38,10 +38,11 @@ class Machine(Value):
     """A robot with its limits, bodies, drives and controller.
 
     tool_length: metres from p (the platform line's origin, where offset = 0) along i to the tool tip.
-    rapid_velocity: largest tip speed on rapids, m/s. drives, masses: for simulation alone; a program does not depend on
-    them. guides: of a reconfigurable machine, on which the base joints are set before a program runs; rail_positions
-    (n_legs,) metres: where they stand; `robot` is the geometry there. calibration: from which `robot` is the machine as
-    built; None where it is the one that was designed. leg_model: from readings to what drives are told, in posts.
+    rapid_velocity: largest tip speed on rapids, m/s. drives, masses: programs depend on them only where drive_forces
+    has limits; cutting_force: newtons on the tip, in any direction, that drives with limits keep free on cuts. guides:
+    of a reconfigurable machine, on which the base joints are set before a program runs; rail_positions (n_legs,)
+    metres: where they stand; `robot` is the geometry there. calibration: from which `robot` is the machine as built;
+    None where it is the one that was designed. leg_model: from readings to what drives are told, in posts.
     limb: the passive limb that holds the platform, where one does.
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
@@ -65,6 +66,8 @@ class Machine(Value):
     work: WorkVolume
     drives: Drives = field(default_factory=Drives)
     masses: Masses = field(default_factory=Masses)
+    drive_forces: DriveForces = field(default_factory=DriveForces)
+    cutting_force: float = 0.0
     tool_limits: ToolLimits = field(default_factory=ToolLimits)
     guides: ReconfigurablePentapod | None = None
     calibration: CalibrationRecord | None = None
@@ -76,7 +79,8 @@ class Machine(Value):
     def __post_init__(self) -> None:
         positive(self, "tool_length", "rapid_velocity")
         count = self.robot.n_legs
-        each = {name: for_legs(getattr(self, name), count) for name in ("legs", "joints", "drives", "leg_model")}
+        parts = ("legs", "joints", "drives", "drive_forces", "leg_model")
+        each = {name: for_legs(getattr(self, name), count) for name in parts}
         set_frozen(self, **each)
         self._check_legs()
         rails = (
@@ -109,10 +113,19 @@ class Machine(Value):
             "min_length": self.legs.min_length,
             "base_cone": self.joints.base_cone,
             "moving_mass": self.drives.moving_mass,
+            "peak_force": self.drive_forces.peak_force,
         }
         for key, values in rows.items():
             if len(values) != count:
                 raise MachineError("wrong count", key=key, value=len(values), expected=f"one for each of {count} legs")
+        on_line = not self.robot.arms.any() and self.limb is None
+        if self.drive_forces.limited and not (on_line and not getattr(self.robot, "radii", np.zeros(1)).any()):
+            raise MachineError(
+                "forces of the drives are known only where all legs end on the tool's line and nothing else holds it",
+                key="peak_force",
+                value=self.drive_forces.peak_force.tolist(),
+                remedy="leave it out, or describe the machine without arms and rings",
+            )
         if self.guides is not None and not isinstance(self.robot, LinearPentapod):
             raise MachineError(
                 "guides are for machines of the quadratic family alone",
@@ -134,7 +147,8 @@ class Machine(Value):
     def digest(self) -> str:
         """16 hexadecimal digits of a SHA-256 over all numbers that programs depend on, −0 counted as 0.
 
-        Name, drives and masses do not count. With its guides elsewhere it is another machine.
+        The name does not count, nor do drives and masses unless the drives' forces are limited. With its guides
+        elsewhere it is another machine.
         """
         return digest_of(dict(_numbers(self)))
 
@@ -203,6 +217,10 @@ def _numbers(machine: Machine) -> Iterator[tuple[str, object]]:
             yield f"{type(part).__name__}.{item.name}", getattr(part, item.name)
     yield from (("tool_length", machine.tool_length), ("rapid_velocity", machine.rapid_velocity))
     yield from machine.tool_limits.given().items()
+    if machine.drive_forces.limited:
+        yield from machine.drive_forces.given().items()
+        yield from (("moving_mass", machine.drives.moving_mass), ("cutting_force", machine.cutting_force))
+        yield from ((item.name, getattr(machine.masses, item.name)) for item in dataclasses.fields(machine.masses))
     if machine.limb is not None:
         yield from machine.limb.numbers()
     if machine.guides is not None:

@@ -21,7 +21,7 @@ from pentapod.base.toml import line_of, parsed, read_toml
 from pentapod.kinematics.families.quadratic import LinearPentapod
 from pentapod.kinematics.families.reconfigurable import ReconfigurablePentapod
 from pentapod.kinematics.robot import Robot
-from pentapod.machine.drives import Drives, Masses
+from pentapod.machine.drives import DriveForces, Drives, Masses
 from pentapod.machine.families import FAMILIES, legs_of
 from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
@@ -132,6 +132,7 @@ def _fields(tables: Any, file: str | Path) -> dict[str, Any]:
         "controller": ControllerSettings(**fields_from(ControllerSettings, tables.controller)),
         "work": WorkVolume(**fields_from(WorkVolume, tables.work)),
         "drives": Drives(**fields_from(Drives, tables.drives)),
+        "drive_forces": DriveForces(**fields_from(DriveForces, tables.drives)),
         "masses": Masses(**fields_from(Masses, tables.masses)),
         "tool_limits": ToolLimits(**fields_from(ToolLimits, tables.tool)),
         "limb": None if family.limb is None else family.limb(tables.geometry),

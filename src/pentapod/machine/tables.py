@@ -11,7 +11,7 @@ from pydantic import Field, create_model
 from pentapod.base.arrays import Floats
 from pentapod.base.keys import Key, declared
 from pentapod.base.tables import TomlTable, extended, table_of
-from pentapod.machine.drives import Drives, Masses
+from pentapod.machine.drives import DriveForces, Drives, Masses
 from pentapod.machine.families import OfFamily
 from pentapod.machine.fields import LEG_PAIRS, PER_LEG, each_leg
 from pentapod.machine.leg_model import LegModel
@@ -73,7 +73,7 @@ PARTS: dict[str, tuple[type, ...]] = {
     "tool": (MachineToolKeys, ToolLimits),
     "controller": (ControllerSettings,),
     "work": (WorkVolume,),
-    "drives": (Drives,),
+    "drives": (Drives, DriveForces),
     "masses": (Masses,),
 }
 """The dataclasses whose keys a table has, by the table's name."""

@@ -152,14 +152,18 @@ def _run(
     sites = [model.site(name).id for name in names]
     positions, axes = np.empty((rows, len(sites), 3)), np.empty((rows, 3))
     lengths, drive_forces, loop_forces = np.empty((rows, legs)), np.empty((rows, legs)), np.empty((rows, 3 * legs))
+    rates = drives.rates
     for row in range(rows):
         if row:
             data.xfrc_applied[body] = wrench[row - 1]
             for part in range((row - 1) * parts, row * parts):
                 drives.set(*(values[part] for values in commands))
+                rates = drives.rates
                 mujoco.mj_step(model, data)
-        # After a step forces are those of its start; positions are updated by mj_kinematics.
-        drive_forces[row], loop_forces[row] = data.actuator_force[:legs], data.efc_force[: 3 * legs]
+        # After a step forces are those of its start; positions are updated by mj_kinematics. The integrator takes the
+        # drives' damping by the rates at the step's end.
+        drive_forces[row] = data.actuator_force[:legs] - drives.damping * (drives.rates - rates)
+        loop_forces[row] = data.efc_force[: 3 * legs]
         mujoco.mj_kinematics(model, data)
         positions[row], axes[row], lengths[row] = data.site_xpos[sites], data.xmat[body][2::3], drives.lengths
         if row % DEFAULTS.report_rows == 0:
@@ -203,14 +207,22 @@ class _Drives:
         """Leg lengths (n_legs,) now, metres."""
         return self._data.qpos[self._addresses]
 
+    @property
+    def rates(self) -> Floats:
+        """Rates of the legs (n_legs,) now, m/s."""
+        return np.array(self._data.qvel[self._rate_addresses])
+
+    @property
+    def damping(self) -> Floats:
+        """Force (n_legs,) for a rate error of 1 m/s, N·s/m."""
+        return self._drives.moving_mass * self._drives.velocity_gain
+
     def set(self, length: Floats, rate: Floats, acceleration: Floats, load: Floats) -> None:
         """Set the drives' set values and loads for the next step, each (n_legs,)."""
         d = self._drives
         feedforward = d.velocity_feedforward * rate
         # The present rate follows from the command of the step before.
-        self._integral += self._step * (
-            d.position_gain * (length - self.lengths) + self._feedforward - self._data.qvel[self._rate_addresses]
-        )
+        self._integral += self._step * (d.position_gain * (length - self.lengths) + self._feedforward - self.rates)
         self._feedforward = feedforward
         push = (
             d.velocity_gain * (feedforward + d.velocity_integral * self._integral)

@@ -93,7 +93,7 @@ def certify(
             if isinstance(limit, Feed):
                 own = times[start : start + part.count + 1]
                 found = _feed(trajectory, machine, part, own, spot, of_tip=given is not None)
-            elif any(limit is one for one in trajectory.limits):
+            elif limit.of_path or any(limit is one for one in trajectory.limits):
                 found = _piecewise(limit, trajectory, part, start)
             else:
                 found = limit.largest(part)

@@ -206,7 +206,7 @@ def test_every_key_is_described_and_has_its_unit():
         "towards", "effect", "levels", "threshold", "frame", "use", "waive", "lowest_share", "left_share",
         "rotary_axes", "tool",
     }  # fmt: skip
-    units = ("_mm", "_deg", "_mm_min", "_ms", "_s", "_mm_s2", "_mm_s3", "_deg_s", "_deg_s2")
+    units = ("_mm", "_deg", "_mm_min", "_ms", "_s", "_n", "_mm_s2", "_mm_s3", "_deg_s", "_deg_s2")
     models = [table_model(name) for name in JobTables.model_fields if name != "toolpath"]
     for model in [*models, *(table_model("toolpath", name) for name in job_strategies())]:
         assert model.__doc__

@@ -25,10 +25,10 @@ LARGEST_TOLERANCE = 0.1
 
 
 def job_machine(job: Job, machine: Machine | None = None) -> Machine:
-    """Return the machine with the job's tool length, controller settings and tool limits.
+    """Return the machine with the job's tool length, controller settings, tool limits and cutting force.
 
     machine: the one to use instead of the machine that the job names. Raises MachineError where its file is wrong,
-    InputError where `machine` is none, JobError where the tool length does not go with it.
+    InputError where `machine` is none, JobError where the tool length or the cutting force does not go with it.
     """
     if machine is None:
         machine = Machine.load(job.machine_file or str(job.machine.name))
@@ -42,8 +42,15 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
     )
     length = machine.tool_length if job.tool.length_mm is None else job.tool.si.length
     limits = machine.tool_limits.and_(ToolLimits(**fields_from(ToolLimits, job.feed)))
+    cutting = job.feed.si.cutting_force
+    if cutting > 0.0 and not machine.drive_forces.limited:
+        remedy = "give peak_force_n in [drives] of the machine file, or leave the cutting force out"
+        what = "the machine says nothing of the force of its drives"
+        raise job.error("feed", "cutting_force_n", what, value=cutting, remedy=remedy)
     try:
-        return dataclasses.replace(machine, controller=controller, tool_length=length, tool_limits=limits)
+        return dataclasses.replace(
+            machine, controller=controller, tool_length=length, tool_limits=limits, cutting_force=cutting
+        )
     except MachineError as error:
         raise job.error("tool", "length_mm", error.what) from error
 

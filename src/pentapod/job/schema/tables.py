@@ -96,6 +96,10 @@ class FeedKeys:
         float | None,
         Key("mm_min", "feed of approaches and links; the cutting feed when left out", gt=0.0, le=100_000.0),
     ] = None
+    cutting_force: Annotated[
+        float,
+        Key("n", "force on the tip, in any direction, that drives with a peak force keep free for cutting", ge=0.0),
+    ] = 0.0
     lowest_share: Annotated[
         float | None,
         Key(

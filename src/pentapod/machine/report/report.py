@@ -18,6 +18,7 @@ from pentapod.kinematics.forces import tip_force_amplification
 from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.leg_clearance import clearances, pair_names
 from pentapod.machine.machine import ARCHITECTURAL_LIMIT, Machine
+from pentapod.machine.report.drives import DriveReport
 from pentapod.machine.work_volume import sample_work_volume
 
 AMPLIFICATION_LIMIT = 10.0
@@ -59,7 +60,7 @@ class MachineReport(Value):
     platform_range (n_legs, 2) radians; margins: least distance from each of the robot's `singularities`, metres or
     radians by its unit; least_turn: radians of turning about the tip to any singularity, None where no closed form
     gives it; amplification: force of the legs by force at the tip; clearance, metres, and its pair of bodies. branch:
-    the one in which all poses lie, or None.
+    the one in which all poses lie, or None. drives: what they can do, where the machine limits their forces.
     """
 
     machine: Machine
@@ -74,6 +75,7 @@ class MachineReport(Value):
     clearance_pair: str
     branch: Branch | None
     findings: tuple[MachineFinding, ...]
+    drives: DriveReport | None = None
 
     @property
     def passed(self) -> bool:
@@ -147,6 +149,7 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = L
             MachineFinding("architectural measure", machine.architecture, "at least", ARCHITECTURAL_LIMIT, ""),
             *_of_rails(machine),
         ),
+        drives=DriveReport.of(machine, position, direction, where) if machine.drive_forces.limited else None,
     )
 
 
@@ -246,6 +249,7 @@ def explain(report: MachineReport) -> str:
         f"  smallest clearance                    {1e3 * report.clearance:.1f} mm ({report.clearance_pair})",
         f"  architectural measure                 {m.architecture:.4f}",
         *(f"  {found.name:<35}   {found.value:.2f}" for found in _of_rails(m)),
+        *([] if report.drives is None else report.drives.lines(m)),
         "",
     ]
     failed = [finding for finding in report.findings if not finding.passed]

@@ -33,6 +33,12 @@ class Capsule:
         return self.mass * (of_cylinder + of_balls) / (cylinder + ball)
 
     @property
+    def moments(self) -> tuple[float, float, float]:
+        """Mass, and its first and second moment about the axis's origin, across the axis: kg, kg·m, kg·m²."""
+        middle = 0.5 * (self.low + self.high)
+        return self.mass, self.mass * middle, self.mass * middle**2 + self.inertia
+
+    @property
     def axial_inertia(self) -> float:
         """Inertia about the axis, kg·m², of a homogeneous body."""
         length, r = self.high - self.low, self.radius

@@ -22,7 +22,8 @@ _BY_BEGINNING = (
     (0, ("every cut",)),
     (1, ("gouge", "surface left")),
     (2, ("clearance",)),
-    (3, ("leg", "base joint", "platform joint", "passive limb", "component kept", "guides", "tip ", "axis ")),
+    (3, ("leg", "continuous leg", "base joint", "platform joint", "passive limb", "component kept", "guides")),
+    (3, ("tip ", "axis ")),
     (
         4,
         (

@@ -1,4 +1,4 @@
-"""The plots of a program against time: lengths, rates, accelerations and jerks of its legs, speed, margins."""
+"""The plots of a program against time: lengths, rates, accelerations, jerks and forces of its legs, speed, margins."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pentapod.report.figure import DETAIL
 from pentapod.report.pack import Packed
 from pentapod.report.series import Curve, Row, bucket_edges, bucket_places, extremes, packed_rows
 from pentapod.report.signals import Signals
+from pentapod.verify.replay.row_forces import RowForces
 
 SPEED_COLOUR = "#296cb8"
 
@@ -32,6 +33,14 @@ def plots_of(packed: Packed, signals: Signals, machine: Machine) -> dict[str, An
         Row(title, extremes(1e3 * values, buckets), legs, np.unique([1e3 * low, 1e3 * high]).tolist(), grouped=True)
         for title, values, low, high in by_leg
     ]
+    if machine.drive_forces.limited:
+        peak, poses = (
+            machine.drive_forces.peak_force,
+            (signals.tips + machine.tool_length * signals.axes, -signals.axes),
+        )
+        push = RowForces.at(machine, poses, signals.rates, signals.accelerations, signals.cutting).push
+        ends = np.unique([-peak, peak]).tolist()
+        rows.append(Row("leg forces, N", extremes(push, buckets), legs, ends, grouped=True))
     speeds = 6e4 * np.stack([signals.speeds, signals.speed_limits], axis=1)
     moves = [Curve("as it moves", SPEED_COLOUR), Curve("feed or rapid rate", LIMIT_COLOUR, (6, 4))]
     rows.append(Row("speed, mm/min", extremes(speeds, buckets), moves, low=0.0))

@@ -155,8 +155,9 @@ class Limit(Protocol):
     """One limit: a subclass defines `names` and at least one kind of rows; the other methods default to these.
 
     quantity: its name in certificates; unit: SI, of the values there. of_legs: one name for each leg.
-    of_tool: it needs tip or axis of the setpoints. sectional: it is constant between two marks of the path (feeds), so
-    that nothing needs to be checked between gridpoints. above: why a value may slightly exceed its bound.
+    of_tool: it needs tip or axis of the setpoints. of_path: it is judged piece by piece. sectional: it is constant
+    between two marks of the path (feeds), so that nothing needs to be checked between gridpoints. above: why a value
+    may slightly exceed its bound.
     """
 
     quantity: ClassVar[str]
@@ -164,6 +165,7 @@ class Limit(Protocol):
     group: ClassVar[Group]
     of_legs: ClassVar[bool] = False
     of_tool: ClassVar[bool] = False
+    of_path: ClassVar[bool] = False
     sectional: ClassVar[bool] = False
     above: ClassVar[str] = ""
 
@@ -207,6 +209,11 @@ class Limit(Protocol):
             shares.append(np.abs(jerks @ np.stack([v**3, 2.0 * v * u, 2.0 * motion.jerk], axis=1)[:, :, None])[:, :, 0])
         one_each = (y if y.shape[1] == len(self.names) else y.max(axis=1, keepdims=True) for y in shares)
         return np.max([np.zeros((len(path.s), len(self.names))), *one_each], axis=0)
+
+    def at_rest(self, path: PathDerivatives, index: int, row: int) -> str:
+        """Return in words by how much one of `acceleration_rows` is exceeded at rest, at one of the path's stations."""
+        rows = self.acceleration_rows(path)
+        return "" if rows is None else f"{abs(rows.offset[index, row]):.3g} times the limit"
 
     def measured(self, setpoints: InterpolatedSetpoints) -> Floats:
         """Return the quantity (rows or intervals, names) of interpolated setpoints; by default the share there."""

@@ -15,6 +15,7 @@ from pentapod.timing.limits.axis_acceleration import AxisAcceleration
 from pentapod.timing.limits.axis_velocity import AxisVelocity
 from pentapod.timing.limits.feed import Feed
 from pentapod.timing.limits.leg_acceleration import LegAcceleration
+from pentapod.timing.limits.leg_force import LegForce
 from pentapod.timing.limits.leg_jerk import LegJerk
 from pentapod.timing.limits.leg_velocity import LegVelocity
 from pentapod.timing.limits.limit import (
@@ -41,6 +42,7 @@ LIMITS: tuple[type[MachineLimit], ...] = (
     TipJerk,
     AxisVelocity,
     AxisAcceleration,
+    LegForce,
 )
 """Every limit that a machine or a path sets, in the order of rows and certificates; a new one is added here."""
 
@@ -117,9 +119,17 @@ class Limits:
         """Return the name of the limit to which each row of `rows` belongs."""
         names: list[str] = []
         for limit, rows in self._rows(path):
-            count = rows.first.shape[1]
-            names += limit.names if count == len(limit.names) else limit.names[:1] * count
+            times, rest = divmod(rows.first.shape[1], len(limit.names))
+            names += limit.names[:1] * rows.first.shape[1] if rest else limit.names * times
         return tuple(names)
+
+    def at_rest(self, path: PathDerivatives, index: int, row: int) -> str:
+        """Return in words by how much one of `rows` is exceeded at rest, at one of the path's stations."""
+        for limit, rows in self._rows(path):
+            if row < rows.first.shape[1]:
+                return limit.at_rest(path, index, row)
+            row -= rows.first.shape[1]
+        return ""
 
     def jerk_rows(self, path: PathDerivatives) -> Floats:
         """Return the jerks' rows (n, K, 3) of x, x′, x″, by √x."""

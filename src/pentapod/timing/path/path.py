@@ -11,6 +11,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.values import Value
+from pentapod.machine.dynamics.dynamics import Dynamics, ForceTerms
 from pentapod.toolpath.toolpath import SegmentKind
 
 
@@ -78,6 +79,23 @@ class PathDerivatives(Value):
     def legs(self) -> tuple[Floats, ...]:
         """The legs' derivatives, (n, legs) each."""
         return tuple(self.piece.derivatives(self.s, self.order)[1:])
+
+    @cached_property
+    def poses(self) -> tuple[tuple[Floats, Floats], ...]:
+        """Tip and tool axis (n, 3), and their derivatives of orders 1 and 2."""
+        return tuple(self.piece.pose(self.s, k) for k in range(3))
+
+    def force_terms(self, dynamics: Dynamics, *, reach: bool) -> ForceTerms:
+        """Return the terms of the drives' forces at the stations; reach: with that of a force on the tip."""
+        key = id(dynamics), reach
+        if key not in self._forces:
+            self._forces[key] = dynamics, dynamics.along(self.poses, reach=reach)
+        return self._forces[key][1]
+
+    @cached_property
+    def _forces(self) -> dict[tuple[int, bool], tuple[Dynamics, ForceTerms]]:
+        """What `force_terms` has found, by the identity of the dynamics, which is kept from being used again."""
+        return {}
 
     @cached_property
     def tip(self) -> tuple[Floats, ...]:

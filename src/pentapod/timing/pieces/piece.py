@@ -75,6 +75,9 @@ class PieceProfile:
             return self.with_(x=x)
         names = self.limits.row_names(self.derivatives)
         limits = tuple(dict.fromkeys(names[row] for row in x.conflict))
+        if x.reason == STANDS_BEYOND:
+            told = self.limits.at_rest(self.derivatives, x.gridpoint, x.conflict[0])
+            x = replace(x, reason=f"{STANDS_BEYOND}: {told}")
         return replace(x, limits=limits, station=float(self.s[x.gridpoint]) if x.gridpoint >= 0 else None)
 
     def fastest(self, s: Floats, rows: AccelerationRows, ceiling: Floats) -> Floats | Failure:
@@ -82,8 +85,7 @@ class PieceProfile:
         at_rest = np.abs(rows.offset).max(axis=1)
         if (at_rest >= 1.0).any():
             k = int(at_rest.argmax())
-            reason = f"{STANDS_BEYOND}: {at_rest[k]:.3g} times the limit"
-            return Failure(k, reason, (int(np.abs(rows.offset[k]).argmax()),))
+            return Failure(k, STANDS_BEYOND, (int(np.abs(rows.offset[k]).argmax()),))
         ends = {"x_start": self.x_start, "x_end": self.x_end}
         return fastest(s, rows.first, rows.second, ceiling, offset=rows.offset, **ends, engine=self.engine)
 

@@ -1,15 +1,16 @@
-"""Claims about each leg: length, rate, acceleration, jerk. Exact on the controller's polynomials."""
+"""Claims about each leg: length, rate, acceleration, jerk, exact on the controller's polynomials, and forces."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.verify.replay.claim import MM, TOLERATED, Claim, Finding
+from pentapod.verify.replay.claim import MM, TOLERATED, Claim, Finding, Idle
 from pentapod.verify.replay.interval_bounds import RunningMaximum
 from pentapod.verify.replay.replay import Replay
 from pentapod.verify.verdict.verdict import Place
 
+_NO_FORCES = "the machine says nothing of the forces of its drives"
 _EXACT = "exact extreme values of the controller's polynomials, at the rows and between them"
 
 
@@ -56,6 +57,36 @@ def jerk(replay: Replay) -> Finding:
     return _below(replay, replay.interval_bounds.jerks, replay.machine.legs.max_jerk, "mm/s³", method)
 
 
+def force(replay: Replay) -> Finding | Idle:
+    """Judge the force that each drive needs at the rows against what it has there."""
+    if not replay.machine.drive_forces.limited:
+        return Idle(_NO_FORCES)
+    forces = replay.forces
+    row, leg = np.unravel_index(int((forces.asked / forces.available).argmax()), forces.asked.shape)
+    value, bound = float(forces.asked[row, leg]), float(forces.available[row, leg])
+    method = f"inverse dynamics of the machine's masses at the rows, {_parts(replay)}; {TOLERATED}"
+    return Finding.at_most(value, bound, 1.0, "N", replay.place(2 * int(row)), _method(int(leg), method))
+
+
+def continuous_force(replay: Replay) -> Finding | Idle:
+    """Judge the root mean square of each drive's force over the whole program."""
+    limit = replay.machine.drive_forces.continuous_force
+    if not np.isfinite(limit).any():
+        return Idle("the machine says nothing of the force that its drives bear all the time")
+    forces = replay.forces
+    mean = np.sqrt(np.square(np.abs(forces.push) + forces.cutting).mean(axis=0))
+    leg = int(np.argmax(mean / limit))
+    row = int(np.argmax(np.abs(forces.push[:, leg]) + forces.cutting[:, leg]))
+    method = f"root mean square over all rows of the force by the machine's masses, {_parts(replay)}; {TOLERATED}"
+    where = replay.place(2 * row)
+    return Finding.at_most(float(mean[leg]), float(limit[leg]), 1.0, "N", where, _method(leg, method))
+
+
+def _parts(replay: Replay) -> str:
+    cutting = replay.machine.cutting_force
+    return "with friction" + (f" and {cutting:g} N in any direction on the tip on cuts" if cutting else "")
+
+
 def _below(replay: Replay, found: RunningMaximum, limit: Floats, unit: str, method: str) -> Finding:
     """Judge the largest value of each leg against limits (n_legs,), both SI."""
     leg = int(np.argmax(found.values / limit))
@@ -77,4 +108,6 @@ CLAIMS = (
     Claim("leg rates", rate, needs_pose=False),
     Claim("leg accelerations", acceleration, needs_pose=False),
     Claim("leg jerks", jerk, needs_pose=False),
+    Claim("leg forces", force),
+    Claim("continuous leg forces", continuous_force),
 )

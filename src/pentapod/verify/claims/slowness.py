@@ -124,6 +124,8 @@ def _used(replay: Replay) -> Floats:
     used = (np.abs(np.diff(replay.program.legs, axis=0)) / (period * legs.max_velocity)).max(axis=1)
     _raise(used, _differences(replay.program.legs, 2, period) / legs.max_acceleration)
     _raise(used, _differences(replay.program.legs, 3, period) / legs.max_jerk)
+    if machine.drive_forces.limited:
+        _raise(used, replay.forces.motion_shares[1:-1])
     if tool.given():
         position, direction = replay.pose
         tips, axes = (position + machine.tool_length * direction)[::2], direction[::2]

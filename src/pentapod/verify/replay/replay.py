@@ -8,19 +8,21 @@ from functools import cached_property
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.base.progress import Progress, silent
 from pentapod.base.values import Value
 from pentapod.geometry.interpolant import clamped_slopes
+from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
 from pentapod.program.program import Program
-from pentapod.toolpath.toolpath import Toolpath
+from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 from pentapod.verify.replay.free_space import PosedPolyline
 from pentapod.verify.replay.interval_bounds import IntervalBounds, interval_bounds
 from pentapod.verify.replay.path_matching import OPTIONS as MATCHING
 from pentapod.verify.replay.path_matching import PathMatch, match
+from pentapod.verify.replay.row_forces import RowForces
 from pentapod.verify.verdict.specification import Specification
 from pentapod.verify.verdict.verdict import Place
 
@@ -122,6 +124,22 @@ class Replay(Value):
             axis_bound=self.specification.tilt + self.specification.axis_tolerance,
             chord_deviations=self.interval_bounds.deviations,
         )
+
+    @cached_property
+    def forces(self) -> RowForces:
+        """Forces of the drives at the rows, of a machine that limits them. Needs a pose at every row."""
+        position, direction = (pose[::2] for pose in self.pose)
+        program = self.program
+        cuts = self._cuts() if self.machine.cutting_force else np.zeros(len(program.legs), dtype=np.bool_)
+        return RowForces.of(program, self.machine, self.slopes, (position, direction), cuts)
+
+    def _cuts(self) -> Bools:
+        """Return the rows (N,) on a cut and farther than the path tolerance from its ends."""
+        arcs, ends = self.match.arcs[::2], arc_length(self.toolpath.tilt_centres)[self.toolpath.starts]
+        first = np.searchsorted(ends, arcs - self.match_radius, side="right")
+        behind = np.searchsorted(ends, arcs + self.match_radius, side="left")
+        kinds = [segment.kind is SegmentKind.CUT for segment in self.toolpath.segments]
+        return np.array([False, *kinds, False])[first] & (first == behind)
 
     def place(self, sample: float) -> Place:
         """Return the place of a sample (or of a moment between samples)."""
