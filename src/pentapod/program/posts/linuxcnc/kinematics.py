@@ -118,7 +118,7 @@ def _home(machine: Machine, component: Branch, frame: RigidTransform) -> Floats:
     left = margins.own(tip, upright)
     if left.min() < 0.0:
         raise MachineError(
-            "the machine cannot stand in the middle of its work volume with the tool upright, where LinuxCNC has its zero",
+            "the machine cannot stand upright in the middle of its work volume, where LinuxCNC has its zero",
             key="work.centre", value=margins.own_limits[int(np.argmin(left))].name, remedy="move the work volume",
         )  # fmt: skip
     return 1e3 * machine.robot.leg_lengths(tip + machine.tool_length * upright, -upright)

@@ -68,7 +68,7 @@ GUARD = GuardOptions()
 
 @dataclass(frozen=True, eq=False)
 class Module:
-    """What the module is made for. frame: machine frame → the controller's. accelerations: of X Y Z A B, mm, degrees."""
+    """What the module is made for. frame: machine → controller. accelerations: of X Y Z A B, mm/s² and deg/s²."""
 
     machine: Machine
     component: Branch
@@ -132,12 +132,10 @@ def _design(given: Module) -> dict[str, str]:
 
 
 def _as_it_is(machine: Machine) -> dict[str, str]:
-    robot = machine.robot
-    measured = isinstance(robot, AsBuiltPentapod)
-    rings, zeros = (robot.radii, robot.zeros) if measured else (np.zeros(5), np.zeros(5))
+    robot = machine.robot if isinstance(machine.robot, AsBuiltPentapod) else nominal_robot(machine)
     return {
-        "AS_BUILT": str(int(measured)), "BASE": _numbers(1e3 * robot.base_joints.T),
-        "OFFSET": _numbers(1e3 * robot.offsets), "RING": _numbers(1e3 * rings), "ZERO": _numbers(1e3 * zeros),
+        "AS_BUILT": str(int(isinstance(robot, AsBuiltPentapod))), "BASE": _numbers(1e3 * robot.base_joints.T),
+        "OFFSET": _numbers(1e3 * robot.offsets), "RING": _numbers(1e3 * robot.radii), "ZERO": _numbers(1e3 * robot.zeros),
     }  # fmt: skip
 
 

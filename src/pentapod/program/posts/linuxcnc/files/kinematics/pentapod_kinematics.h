@@ -183,7 +183,7 @@ static inline double pentapod_surface(const pentapod_line *line)
 
 #if PENTAPOD_AS_BUILT
 
-enum { PENTAPOD_ROUNDS = 12 };
+enum { PENTAPOD_ROUNDS = 12, PENTAPOD_STAGES = 8 };
 
 /* Solve a x = b by elimination with row exchanges; b becomes x. -1 where a pivot vanishes. */
 static inline int pentapod_solve(double a[PENTAPOD_LEGS][PENTAPOD_LEGS], double b[PENTAPOD_LEGS])
@@ -278,31 +278,19 @@ static inline int pentapod_step(
     return 0;
 }
 
-#endif
-
-/* The pose of legs in the component, without a guess. 0, or -1 where there is none, or none that is certain: Newton's
- * steps from the closed form must each be at most half the one before, and end on the component's side of w and S. */
-static inline int pentapod_line_of_legs(const double legs[PENTAPOD_LEGS], pentapod_line *line)
+/* From a pose to the one of these lengths. 0, or -1 where a step is more than half the one before. */
+static inline int pentapod_newton(const double length[PENTAPOD_LEGS], pentapod_line *line)
 {
-#if PENTAPOD_AS_BUILT
-    double length[PENTAPOD_LEGS], step[PENTAPOD_LEGS], before = 0.0, size, off, w_squared;
+    double step[PENTAPOD_LEGS], before = 0.0, size, off, w_squared;
     int round, k;
-    for (k = 0; k < PENTAPOD_LEGS; k++) {
-        length[k] = legs[k] - PENTAPOD_ZERO[k];
-        if (!(length[k] > 0.0))
-            return -1;
-    }
-    if (pentapod_closed_form(length, line))
-        return -1;
     for (round = 0; round < PENTAPOD_ROUNDS; round++) {
         if (pentapod_step(length, line, step, &off))
             return -1;
-        size = 0.0;
+        size = 256.0 * pentapod_most(fabs(step[3]), fabs(step[4]));
         for (k = 0; k < 3; k++) {
             size = pentapod_most(size, fabs(step[k]));
             line->point[k] += step[k];
         }
-        size = pentapod_most(size, 256.0 * pentapod_most(fabs(step[3]), fabs(step[4])));
         line->direction[0] += step[3];
         line->direction[1] += step[4];
         w_squared = 1.0 - line->direction[0] * line->direction[0] - line->direction[1] * line->direction[1];
@@ -311,12 +299,45 @@ static inline int pentapod_line_of_legs(const double legs[PENTAPOD_LEGS], pentap
         line->direction[2] = PENTAPOD_SIGN_W * sqrt(w_squared);
         /* Each step is about the square of the one before: this one leaves nothing. */
         if (size < 1e-6 && off < 1e-6)
-            return pentapod_surface(line) > 0.0 ? 0 : -1;
+            return 0;
         if (round > 0 && !(size <= 0.5 * before))
             return -1;
         before = size;
     }
     return -1;
+}
+
+#endif
+
+/* The pose of legs in the component, without a guess. 0, or -1 where there is none, or none that is certain.
+ * As built: Newton's steps from the closed form, each at most half the one before, and an end on the component's side of
+ * w and S; where that fails, the same on a way of eight stages from the closed form's own lengths to the real ones. */
+static inline int pentapod_line_of_legs(const double legs[PENTAPOD_LEGS], pentapod_line *line)
+{
+#if PENTAPOD_AS_BUILT
+    double length[PENTAPOD_LEGS], way[PENTAPOD_LEGS];
+    pentapod_line start;
+    pentapod_struts struts;
+    int stage, k;
+    for (k = 0; k < PENTAPOD_LEGS; k++) {
+        length[k] = legs[k] - PENTAPOD_ZERO[k];
+        if (!(length[k] > 0.0))
+            return -1;
+    }
+    if (pentapod_closed_form(length, &start))
+        return -1;
+    *line = start;
+    if (pentapod_newton(length, line)) {
+        pentapod_struts_of_line(&start, &struts);
+        *line = start;
+        for (stage = 1; stage <= PENTAPOD_STAGES; stage++) {
+            for (k = 0; k < PENTAPOD_LEGS; k++)
+                way[k] = struts.length[k] + (length[k] - struts.length[k]) * stage / PENTAPOD_STAGES;
+            if (pentapod_newton(way, line))
+                return -1;
+        }
+    }
+    return pentapod_surface(line) > 0.0 ? 0 : -1;
 #else
     return pentapod_closed_form(legs, line);
 #endif
