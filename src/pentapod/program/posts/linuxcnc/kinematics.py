@@ -8,12 +8,14 @@ servo thread, stops jogs and programs before them.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError, MachineError
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import Component
 from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.robot import Branch, own_branch
 from pentapod.machine.machine import Machine
@@ -27,6 +29,7 @@ from pentapod.program.posts.linuxcnc.config import (
     number,
     servo_period_ns,
 )
+from pentapod.program.posts.files import write_files
 from pentapod.program.posts.linuxcnc.module import Module, module_files, nominal_robot
 from pentapod.toolpath.formats import FORMATS
 from pentapod.toolpath.formats.rotary import AB
@@ -93,6 +96,18 @@ def kinematics_files(
         **files_of(ini, hal_text(robot.n_legs) + _guard_text(robot.n_legs), FILE, code, robot.n_legs),
         **module_files(module),
     }
+
+
+def write_kinematics(machine: Machine, component: Branch, folder: Path) -> list[Path]:
+    """Write the folder without a program, at the machine's own period, and return its files. Raises as above."""
+    return write_files(kinematics_files(machine, component, machine.controller.period), folder)
+
+
+def upright_component(machine: Machine) -> Branch:
+    """Return the component in which the machine stands in the middle of its work volume with the tool upright."""
+    upright = np.array([0.0, 0.0, 1.0])
+    signs = nominal_robot(machine).branch(machine.work.centre - machine.tool_length * upright, upright)
+    return Component(*signs.tolist())
 
 
 def controller_frame(machine: Machine, component: Branch) -> RigidTransform:

@@ -135,7 +135,8 @@ def _as_it_is(machine: Machine) -> dict[str, str]:
     robot = machine.robot if isinstance(machine.robot, AsBuiltPentapod) else nominal_robot(machine)
     return {
         "AS_BUILT": str(int(isinstance(robot, AsBuiltPentapod))), "BASE": _numbers(1e3 * robot.base_joints.T),
-        "OFFSET": _numbers(1e3 * robot.offsets), "RING": _numbers(1e3 * robot.radii), "ZERO": _numbers(1e3 * robot.zeros),
+        "OFFSET": _numbers(1e3 * robot.offsets), "RING": _numbers(1e3 * robot.radii),
+        "ZERO": _numbers(1e3 * robot.zeros),
     }  # fmt: skip
 
 

@@ -533,19 +533,18 @@ static inline void pentapod_guard(
         report->feed = share > 1.0 ? 1.0 / share : 1.0;
         share = moving ? settings->path_share : settings->jog_share;
         for (k = 0; k < 5; k++) {
-            double braking = share * settings->acceleration[k];
             rate[k] = (report->world[k] - memory->world[k]) / period;
-            /* Until the stop begins the axis may still be getting faster. */
-            if (fabs(rate[k]) > 1e-6)
-                rate[k] += (rate[k] > 0.0 ? 1.0 : -1.0) * settings->acceleration[k] * late;
-            else
+            if (fabs(rate[k]) < 1e-6)
                 rate[k] = 0.0;
-            longest = pentapod_most(longest, fabs(rate[k]) / braking);
+            longest = pentapod_most(longest, fabs(rate[k]) / (share * settings->acceleration[k]));
         }
         for (k = 0; k < 5; k++) {
             /* A program stops all axes together, jogs stop each by itself. */
             double time = moving ? longest : fabs(rate[k]) / (share * settings->acceleration[k]);
-            way[k] = rate[k] * (late + 0.525 * time);
+            /* Until the stop begins it may still be getting faster; at the most twice as fast, so that a motion that
+             * has just begun is not taken for one in another direction. */
+            double faster = time > 0.0 ? 1.0 + pentapod_least(1.0, late / (share * time)) : 1.0;
+            way[k] = faster * rate[k] * (late + 0.525 * faster * time);
         }
         for (k = 0; k < 3; k++)
             steepest = pentapod_most(steepest, settings->acceleration[k]);
