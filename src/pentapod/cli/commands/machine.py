@@ -91,7 +91,7 @@ def check(name_or_file: str, as_json: bool, quiet: bool) -> int:
 def linuxcnc(name_or_file: str, out: Path, as_json: bool, quiet: bool) -> int:
     """Write a kinematics module for LinuxCNC with a simulation, to drive a machine (NAME or FILE.toml) by hand.
 
-    For the quadratic family, as designed or as measured. `pentapod post --to linuxcnc` writes it with a program's toolpath.
+    For the quadratic family, as designed or as measured. `pentapod post --to linuxcnc` adds a program's toolpath.
     """
     from pentapod.machine import Machine
     from pentapod.program.posts.linuxcnc.kinematics import upright_component, write_kinematics

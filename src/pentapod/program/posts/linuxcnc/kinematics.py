@@ -20,6 +20,7 @@ from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.robot import Branch, own_branch
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.margins import Margins
+from pentapod.program.posts.files import write_files
 from pentapod.program.posts.linuxcnc.config import (
     axis_words,
     files_of,
@@ -29,7 +30,6 @@ from pentapod.program.posts.linuxcnc.config import (
     number,
     servo_period_ns,
 )
-from pentapod.program.posts.files import write_files
 from pentapod.program.posts.linuxcnc.module import Module, module_files, nominal_robot
 from pentapod.toolpath.formats import FORMATS
 from pentapod.toolpath.formats.rotary import AB
