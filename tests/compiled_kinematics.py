@@ -53,6 +53,13 @@ void inverses(long n, const double *world, double *legs, double *margins)
         pentapod_inverse(world + 5 * k, PENTAPOD_TOOL_LENGTH, legs + 5 * k, margins + PENTAPOD_MARGINS * k);
 }
 
+void others(long n, const double *legs, double slack, int *out)
+{
+    long k;
+    for (k = 0; k < n; k++)
+        out[k] = pentapod_other_modes(legs + 5 * k, slack);
+}
+
 /* Rows of legs one after the other: known, stop and hold of each period. */
 void guards(long n, const double *legs, double period, int moving, const double *least, const double *fast, int *out)
 {
@@ -102,6 +109,12 @@ class Compiled:
         legs, margins = np.empty((len(worlds), 5)), np.empty((len(worlds), len(MARGINS)))
         self.library.inverses(len(worlds), _at(worlds := np.ascontiguousarray(worlds)), _at(legs), _at(margins))
         return legs, margins
+
+    def others(self, legs: np.ndarray, slack: float) -> np.ndarray:
+        """How many poses of other components are possible (N,)."""
+        out = np.empty(len(legs), dtype=np.intc)
+        self.library.others(len(legs), _at(legs := np.ascontiguousarray(legs)), ctypes.c_double(slack), _at(out))
+        return out
 
     def guards(self, legs: np.ndarray, moving: bool, least: np.ndarray, fast: np.ndarray) -> np.ndarray:
         """Known, stop, hold (N, 3) of rows of legs, a millisecond apart."""

@@ -21,6 +21,7 @@ from compiled_kinematics import (
     world_of,
 )
 from pentapod.base.errors import MachineError
+from pentapod.cli.main import run
 from pentapod.kinematics import AsBuiltPentapod
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine import Machine
@@ -116,6 +117,26 @@ def test_world_comes_back(tmp_path):
     assert np.abs(module.worlds(legs) - world).max() < 1e-8
 
 
+@compiled
+def test_other_components_are_found_where_their_poses_keep_the_cones(tmp_path):
+    machine = Machine.load("desk")
+    p, i = poses(machine, 60_000)
+    legs = machine.robot.leg_lengths(p, i)
+    every, directions = machine.robot.assembly_modes(legs)
+    expected = np.zeros(len(legs), dtype=int)
+    for mode in range(1, 4):
+        vectors = machine.robot.leg_vectors(every[:, mode], directions[:, mode]) / legs[..., None]
+        base = np.einsum("nkc,kc->nk", vectors, machine.joints.base_axes) - np.cos(machine.joints.base_cone)
+        cosine = np.einsum("nkc,nc->nk", vectors, directions[:, mode])
+        low, high = np.cos(machine.joints.platform_range[:, 1]), np.cos(machine.joints.platform_range[:, 0])
+        expected += (base.min(axis=1) > 0.0) & ((cosine > low) & (cosine < high)).all(axis=1)
+    module = Compiled(machine, tmp_path)
+    found = module.others(MM * legs, 0.0)
+    assert 0 < (expected > 0).sum() < 0.05 * len(legs)
+    np.testing.assert_array_equal(found, expected)
+    assert (module.others(MM * legs, 0.01) >= expected).all()
+
+
 def jog(start: np.ndarray, axis: int, speed: float, fast: float, stop_at: int | None, count: int) -> np.ndarray:
     """Worlds (count, 5), a millisecond apart, of a jog that gets faster, and from a period on slower, by `fast`."""
     here, rate, rows = start.copy(), 0.0, []
@@ -184,10 +205,10 @@ def test_shells_compile_without_a_warning(tmp_path):
     for pins, headers in ways:
         (tmp_path / "pentapod_pins.h").write_bytes((tmp_path / pins).read_bytes())
         words = [COMPILER, "-std=gnu99", *STRICT[1:], "-D_GNU_SOURCE", "-DRTAPI", "-DUSPACE", "-isystem", str(headers)]
-        run = subprocess.run(
+        done = subprocess.run(
             [*words, "-c", "pentapod_kins.c"], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
         )
-        assert run.returncode == 0, (pins, run.stderr)
+        assert done.returncode == 0, (pins, done.stderr)
 
 
 def test_module_names_its_machine(tmp_path):
@@ -199,6 +220,16 @@ def test_module_names_its_machine(tmp_path):
     assert machine.digest in readme
     assert not any(b"@" in content for name, content in files.items() if name.endswith((".h", ".c", ".md")))
     assert files == kinematics_files(machine, COMPONENTS[0], 1e-3)
+
+
+def test_machine_command_writes_the_module(tmp_path, capsys):
+    assert run(["machine", "linuxcnc", "desk", "-o", str(tmp_path / "hand")]) == 0
+    assert "kinematics module and simulation of desk" in capsys.readouterr().out
+    expected = kinematics_files(Machine.load("desk"), COMPONENTS[0], 1e-3)
+    assert {file.name: file.read_bytes() for file in (tmp_path / "hand").iterdir()} == expected
+    assert run(["machine", "linuxcnc", "hexa", "-o", str(tmp_path / "none")]) == 2
+    assert "no kinematics module for such a machine" in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
 
 
 @pytest.mark.parametrize("name", ["bench-general", "hexa", "spr", "prpu"])

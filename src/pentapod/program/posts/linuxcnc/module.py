@@ -55,11 +55,13 @@ class GuardOptions:
 
     jog_share, path_share: of the axes' accelerations, with which jogs and programs slow down; LinuxCNC's planner does
     so with 0.6 of them on blended blocks. lead_periods: servo periods from a command to what is done about it.
+    slack: of cosines, by which a pose of another component may be beyond the cones and still count as possible.
     """
 
     jog_share: float = 0.9
     path_share: float = 0.45
     lead_periods: float = 4.0
+    slack: float = 0.01
 
 
 LEAST = LeastMargins()

@@ -136,8 +136,9 @@ static inline void pentapod_legs_of_struts(const pentapod_struts *struts, double
 
 /* ---- legs to poses ---- */
 
-/* The closed form of the design, in the component. 0, or -1 where no pose has these lengths. */
-static inline int pentapod_closed_form(const double length[PENTAPOD_LEGS], pentapod_line *line)
+/* The closed form of the design, in the component of these signs. 0, or -1 where no pose has these lengths. */
+static inline int pentapod_closed_form(
+    const double length[PENTAPOD_LEGS], double sign_w, double sign_s, pentapod_line *line)
 {
     double squared[PENTAPOD_LEGS], form[4], w_squared, w, n1, n2, n_squared, c, d, root, x, z;
     int row, k;
@@ -151,7 +152,7 @@ static inline int pentapod_closed_form(const double length[PENTAPOD_LEGS], penta
     w_squared = 1.0 - form[2] * form[2] - form[3] * form[3];
     if (!(w_squared > 0.0))
         return -1;
-    w = PENTAPOD_SIGN_W * sqrt(w_squared);
+    w = sign_w * sqrt(w_squared);
     /* Leg 3's joint is on the line n . (x, z) = c, at its length from leg 3's base joint. */
     n1 = 1.0 - PENTAPOD_DELTA * form[2];
     n2 = -PENTAPOD_DELTA * w;
@@ -160,7 +161,7 @@ static inline int pentapod_closed_form(const double length[PENTAPOD_LEGS], penta
     d = (squared[2] - form[1] * form[1]) * n_squared - c * c;
     if (!(d > 0.0))
         return -1;
-    root = PENTAPOD_SIGN_S * sqrt(d);
+    root = sign_s * sqrt(d);
     n_squared = 1.0 / n_squared;
     x = (c * n1 - root * n2) * n_squared;
     z = (c * n2 + root * n1) * n_squared;
@@ -324,7 +325,7 @@ static inline int pentapod_line_of_legs(const double legs[PENTAPOD_LEGS], pentap
         if (!(length[k] > 0.0))
             return -1;
     }
-    if (pentapod_closed_form(length, &start))
+    if (pentapod_closed_form(length, PENTAPOD_SIGN_W, PENTAPOD_SIGN_S, &start))
         return -1;
     *line = start;
     if (pentapod_newton(length, line)) {
@@ -339,7 +340,7 @@ static inline int pentapod_line_of_legs(const double legs[PENTAPOD_LEGS], pentap
     }
     return pentapod_surface(line) > 0.0 ? 0 : -1;
 #else
-    return pentapod_closed_form(legs, line);
+    return pentapod_closed_form(legs, PENTAPOD_SIGN_W, PENTAPOD_SIGN_S, line);
 #endif
 }
 
@@ -409,6 +410,33 @@ static inline unsigned pentapod_short_of(const double margin[PENTAPOD_MARGINS], 
         if (!(margin[k] >= least[k]))
             bits |= 1u << k;
     return bits;
+}
+
+/* How many poses of the other components have these legs and keep the cones of all joints; slack: of the cosines. As
+ * built it is the design's poses that are looked at: give it some slack. */
+static inline int pentapod_other_modes(const double legs[PENTAPOD_LEGS], double slack)
+{
+    double length[PENTAPOD_LEGS], margin[PENTAPOD_MARGINS];
+    pentapod_line line;
+    pentapod_struts struts;
+    int mode, k, found = 0;
+    for (k = 0; k < PENTAPOD_LEGS; k++) {
+#if PENTAPOD_AS_BUILT
+        length[k] = legs[k] - PENTAPOD_ZERO[k];
+#else
+        length[k] = legs[k];
+#endif
+    }
+    for (mode = 1; mode < 4; mode++) {
+        double sign_w = mode & 1 ? -PENTAPOD_SIGN_W : PENTAPOD_SIGN_W;
+        double sign_s = mode & 2 ? -PENTAPOD_SIGN_S : PENTAPOD_SIGN_S;
+        if (pentapod_closed_form(length, sign_w, sign_s, &line))
+            continue;
+        pentapod_struts_of_line(&line, &struts);
+        pentapod_margins_of(&line, &struts, margin);
+        found += margin[PENTAPOD_BASE_CONE] > -slack && margin[PENTAPOD_PLATFORM_JOINT] > -slack;
+    }
+    return found;
 }
 
 /* ---- the controller's world: X Y Z A B ---- */

@@ -22,7 +22,7 @@ static const char AXES[] = "xyzab";
 static struct pins {
     pentapod_real tool_length, least[PENTAPOD_MARGINS], acceleration[5], jog_share, path_share, lead;
     pentapod_real command[PENTAPOD_LEGS], feedback[PENTAPOD_LEGS];
-    pentapod_bit enforce, known, stop, hold;
+    pentapod_bit enforce, known, stop, hold, confirm, ambiguous;
     pentapod_number motion_type;
     pentapod_count refusals, why, digest_high, digest_low;
     pentapod_real margin[PENTAPOD_MARGINS], pose[5], tip_error[3], axis_error, rate_share, feed;
@@ -65,6 +65,8 @@ int kinematicsInverse(
     for (k = 0; k < PENTAPOD_MARGINS; k++)
         least[k] = GET_REAL(pins->least[k]);
     why = pentapod_short_of(margin, least);
+    if (GET_BIT(pins->ambiguous) && !GET_BIT(pins->confirm))
+        why |= 1u << PENTAPOD_MARGINS;
     if (why && GET_BIT(pins->enforce)) {
         SET_COUNT(pins->why, why);
         SET_COUNT(pins->refusals, GET_COUNT(pins->refusals) + 1);
@@ -92,7 +94,7 @@ static void guard(void *argument, long period)
     pentapod_report report;
     double command[PENTAPOD_LEGS], feedback[PENTAPOD_LEGS], real[5], error = 0.0;
     pentapod_line told, measured;
-    int k;
+    int k, known = memory.known;
     (void)argument;
     settings.tool_length = GET_REAL(pins->tool_length);
     settings.jog_share = GET_REAL(pins->jog_share);
@@ -106,6 +108,9 @@ static void guard(void *argument, long period)
         feedback[k] = GET_REAL(pins->feedback[k]);
     }
     pentapod_guard(command, 1e-9 * (double)period, GET_NUMBER(pins->motion_type) != 0, &settings, &memory, &report);
+    /* When the pose becomes known: may the legs be those of another component? */
+    if (report.known && !known)
+        SET_BIT(pins->ambiguous, pentapod_other_modes(command, @SLACK@) != 0);
     SET_BIT(pins->known, report.known);
     SET_BIT(pins->stop, report.stop && GET_BIT(pins->enforce));
     SET_BIT(pins->hold, report.hold && GET_BIT(pins->enforce));
@@ -155,6 +160,8 @@ static int make_pins(void)
     bad |= NEW_REAL(owner, HAL_OUT, pins->axis_error, 0.0, "pentapod.axis-error");
     bad |= NEW_REAL(owner, HAL_OUT, pins->rate_share, 0.0, "pentapod.rate-share");
     bad |= NEW_REAL(owner, HAL_OUT, pins->feed, 1.0, "pentapod.feed");
+    bad |= NEW_BIT(owner, HAL_IN, pins->confirm, 0, "pentapod.confirm");
+    bad |= NEW_BIT(owner, HAL_OUT, pins->ambiguous, 0, "pentapod.ambiguous");
     bad |= NEW_BIT(owner, HAL_OUT, pins->known, 0, "pentapod.pose-known");
     bad |= NEW_BIT(owner, HAL_OUT, pins->stop, 0, "pentapod.stop");
     bad |= NEW_BIT(owner, HAL_OUT, pins->hold, 0, "pentapod.hold");
