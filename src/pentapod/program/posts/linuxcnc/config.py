@@ -33,17 +33,13 @@ def ini_text(
     joints: Sequence[Words],
     traj: Words,
     period_ns: int,
-    startup: str = "",
 ) -> str:
-    """Return the ini of a simulation. axes: tables by letter, of `axis_words`; joints: tables of `joint_words`.
-
-    startup: G-code that holds from the beginning.
-    """
+    """Return the ini of a simulation. axes: tables by letter, of `axis_words`; joints: tables of `joint_words`."""
     tables: dict[str, Words] = {
         "EMC": {"VERSION": "1.1", "MACHINE": name, "DEBUG": 0},
         "DISPLAY": {"DISPLAY": "axis", "OPEN_FILE": program, "PROGRAM_PREFIX": ".", "MAX_FEED_OVERRIDE": 1.0},
         "TASK": {"TASK": "milltask", "CYCLE_TIME": 0.001},
-        "RS274NGC": {"PARAMETER_FILE": "linuxcnc.var"} | ({"RS274NGC_STARTUP_CODE": startup} if startup else {}),
+        "RS274NGC": {"PARAMETER_FILE": "linuxcnc.var"},
         "EMCMOT": {"EMCMOT": "motmod", "COMM_TIMEOUT": 4.0, "BASE_PERIOD": 0, "SERVO_PERIOD": period_ns},
         "EMCIO": {"EMCIO": "io", "CYCLE_TIME": 0.1, "TOOL_TABLE": "tool.tbl"},
         "HAL": {"HALFILE": "pentapod.hal", "# HALFILE": "record.hal"},

@@ -88,7 +88,6 @@ def kinematics_files(
             "MAX_ANGULAR_VELOCITY": number(turn_rate),
         },
         servo_period_ns(period),
-        startup="M52 P1",
     )  # fmt: skip
     code = NO_PATH if toolpath is None else _code(_checked(_within(toolpath, machine.rapid_velocity), frame))
     module = Module(machine, component, frame, (gain, gain, gain, gain * turn, gain * turn))
@@ -169,8 +168,9 @@ def _checked(path: Toolpath, frame: RigidTransform) -> Toolpath:
 def _code(path: Toolpath) -> bytes:
     """Return the toolpath as G-code, controller's frame, with a tolerance for blended corners."""
     head, separator, moves = FORMATS["xyzab"].write(path).partition(b"G94\n")
-    # Without P the planner blends corners for speed: by 0.3 mm on a path of gentle turns.
-    return head + separator + f"G64 P{OPTIONS.blend_mm:g}\n".encode() + moves
+    # Without P the planner blends corners for speed: by 0.3 mm on a path of gentle turns. M52 lets the legs' rates
+    # slow it down; as a startup code of the ini it has no effect.
+    return head + separator + f"G64 P{OPTIONS.blend_mm:g}\nM52 P1\n".encode() + moves
 
 
 def _within(path: Toolpath, rapid: float) -> Toolpath:
