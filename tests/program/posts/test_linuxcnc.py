@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from linuxcnc_runs import built, play, real
 from pentapod.base.errors import InputError, ProgramError
+from pentapod.geometry.rigid import RigidTransform
 from pentapod.program import Program
 from pentapod.program.posts import PostInput, write_post
 from pentapod.program.posts.linuxcnc.trivkins import read_gcode
@@ -258,6 +259,16 @@ def test_axes_of_the_kinematics_module_reach_all_that_the_strokes_allow(tmp_path
     home = machine.work.centre - [0.0, 0.0, machine.tool_length]
     homes = [float(ini[f"JOINT_{k}"]["HOME"]) for k in range(5)]
     assert np.abs(MM * machine.robot.leg_lengths(home, np.array([0.0, 0.0, 1.0])) - homes).max() < 1e-9
+
+
+def test_readme_says_where_the_module_would_refuse_the_toolpath(tmp_path):
+    what = given(duration=0.2)
+    post(what, "linuxcnc", tmp_path / "far")
+    assert "refuses blocks" not in (tmp_path / "far/README.md").read_text(encoding="utf-8")
+    down = RigidTransform(np.eye(3), np.array([0.0, 0.0, -0.265]))  # towards the base, and S = 0
+    post(dataclasses.replace(what, toolpath=what.toolpath.transformed(down)), "linuxcnc", tmp_path / "near")
+    told = (tmp_path / "near/README.md").read_text(encoding="utf-8")
+    assert re.search(r"refuses blocks .* until you lower `pentapod\.least\.surface` \(it has [0-9.]+, 20 is", told)
 
 
 def test_the_machine_must_be_the_programs(tmp_path):

@@ -17,18 +17,20 @@ __all__ = ["LINUXCNC", "kinematics", "stream", "trivkins"]
 
 def _write(given: PostInput) -> dict[str, bytes]:
     folders = {"stream": stream.stream_files(given), "trivkins": trivkins.trivkins_files(given)}
-    program, missing = given.program, ""
+    program, note = given.program, ""
     try:
         of_machine = given.the_machine(), program.component, program.period, given.toolpath
         folders["kinematics"] = kinematics.kinematics_files(*of_machine)
+        if given.toolpath is not None:
+            note = kinematics.nearer_than_least(given.the_machine(), program.component, given.toolpath)
     except MachineError as error:
-        missing = f"It is not here: {error}.\n"
+        note = f"It is not here: {error}.\n"
     files = {f"{folder}/{name}": content for folder, files in folders.items() for name, content in files.items()}
     machine = given.the_machine()
     words = {
         "allowed": f"{trivkins.planner_acceleration(program, machine).max():.0f}",
         "limit": f"{1e3 * machine.legs.max_acceleration.min():.0f}",
-        "missing": missing,
+        "note": note,
     }
     text = packaged("README.md").decode()
     for name, value in words.items():
