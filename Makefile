@@ -16,7 +16,7 @@ ORACLES := pytest pytest-xdist hypothesis mpmath rtree pyyaml psutil python-flin
 LOWEST_TESTS := tests/numerics tests/geometry tests/kinematics tests/timing tests/program tests/mesh/query/test_swept_depth.py \
 	tests/toolpath/inputs/test_drawings.py tests/simulate/test_servo.py tests/job/test_pipeline.py
 
-.PHONY: demo test test-all test-lowest lock lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view bench-machines bench-batch bench-design kernels reference pictures page page-check site clean
+.PHONY: demo test test-all test-lowest lock lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view bench-machines bench-batch bench-design bench-control kernels reference pictures page page-check site clean
 
 demo: $(READY)  ## plan a dome and judge the program; kernels are compiled before, on all cores
 	$(BIN)/pentapod warm-up
@@ -99,6 +99,9 @@ bench-batch: $(READY)  ## many jobs killed at random against a serial run, overh
 
 bench-design: $(READY)  ## a machine at `desk`'s needs with smaller leg forces, proven, and the dome planned on it
 	$(BIN)/python benchmarks/design.py
+
+bench-control: $(READY)  ## the kinematics module for LinuxCNC: microseconds, cold starts, against LinuxCNC's own pentakins
+	$(BIN)/python benchmarks/control.py
 
 kernels: $(READY)  ## the list of kernels that `pentapod warm-up` compiles, from what the fast suite calls
 	rm -rf out/kernels && NUMBA_CACHE_DIR=$(CURDIR)/out/kernels $(BIN)/pytest -q $(SPREAD) -m "not slow"

@@ -1,4 +1,4 @@
-"""The folder for LinuxCNC, played by the LinuxCNC that is installed: HAL, interpreter, planner and pentakins.
+"""The folder for LinuxCNC, played by the LinuxCNC that is installed: HAL, interpreter, planner and kinematics module.
 
 Needs the Debian package linuxcnc-uspace and the right to a network of its own (`unshare`); skipped without.
 """
@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from linuxcnc_runs import play, real
+from linuxcnc_runs import built, play, real
 from pentapod.base.errors import InputError, ProgramError
+from pentapod.geometry.rigid import RigidTransform
 from pentapod.program import Program
 from pentapod.program.posts import PostInput, write_post
 from pentapod.program.posts.linuxcnc.trivkins import read_gcode
@@ -105,12 +106,12 @@ def check_accelerations(legs, what, folder, said):
     assert measured == pytest.approx(commanded, abs=1.0)
 
 
-@real
+@built
 def test_an_unverified_folder_runs_with_its_mark_in_every_file(tmp_path):
     write_post(given(duration=1.0), "linuxcnc", tmp_path, unverified=True)
     files = [file for file in tmp_path.rglob("*") if file.is_file()]
     assert all("UNVERIFIED" in "".join(file.read_text().splitlines()[:2]) for file in files)
-    for part in ("stream", "trivkins", "pentakins"):
+    for part in ("stream", "trivkins", "kinematics"):
         table = play(tmp_path / part)
         assert len(table) > 300
 
@@ -124,11 +125,11 @@ def test_what_linuxcnc_refuses_is_said(tmp_path):
         play(tmp_path / "trivkins")
 
 
-@real
-def test_pentakins_leads_the_tool_along_the_toolpath(tmp_path):
+@built
+def test_kinematics_module_leads_the_tool_along_the_toolpath(tmp_path):
     what = given(duration=1.0)
     post(what, "linuxcnc", tmp_path)
-    table = play(tmp_path / "pentakins")
+    table = play(tmp_path / "kinematics")
     joints = table[table[:, 0] > 1.0]
     moving = np.flatnonzero(joints[:, 5] > 0)
     legs = joints[moving[0] :, :5] / MM
@@ -152,7 +153,7 @@ def test_the_interpreter_takes_all_g_code(tmp_path):
     what = given(duration=1.0)
     post(what, "linuxcnc", tmp_path)
     run = subprocess.run(
-        ["rs274", "-g", str(tmp_path / "pentakins/toolpath.ngc")],
+        ["rs274", "-g", str(tmp_path / "kinematics/toolpath.ngc")],
         cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60, check=False,
     )  # fmt: skip
     assert run.returncode == 0, run.stderr
@@ -225,7 +226,7 @@ def test_the_planner_has_the_headroom_that_it_needs(period_ms, tmp_path):
     legs = lengths_at(program, np.arange(0.0, 0.6 + 1e-9, 1e-3 * period_ms))
     again = Program(1e-3 * period_ms, legs, "cubic", program.component, program.placement, source)
     post(PostInput(again, machine), "linuxcnc", tmp_path)
-    assert not (tmp_path / "pentakins").exists()
+    assert b"no toolpath was given" in (tmp_path / "kinematics/toolpath.ngc").read_bytes()
     ini = ini_of(tmp_path / "trivkins/pentapod.ini")
     feed = float(re.search(r"F([0-9.]+)", (tmp_path / "trivkins/program.ngc").read_text())[1])
     dt = 60.0 / feed
@@ -239,21 +240,35 @@ def test_the_planner_has_the_headroom_that_it_needs(period_ms, tmp_path):
         assert float(axis["MAX_LIMIT"]) <= float(joint["MAX_LIMIT"])
 
 
-def test_what_pentakins_is_told(tmp_path):
+def test_axes_of_the_kinematics_module_reach_all_that_the_strokes_allow(tmp_path):
     what = given(duration=0.2)
     post(what, "linuxcnc", tmp_path)
-    hal = (tmp_path / "pentakins/pentapod.hal").read_text()
-    told = dict(re.findall(r"setp pentakins\.(\S+) (\S+)", hal))
-    assert float(told["max-error"]) == 1e6
-    assert all(float(told[f"effector.{k}.r"]) == 0.0 for k in range(5))
-    assert not any(".5." in name for name in told)
-    base = np.array([[float(told[f"base.{k}.{x}"]) for x in "xyz"] for k in range(5)])
-    reach = np.array([float(told[f"effector.{k}.z"]) for k in range(5)])
-    # Leg lengths of machine zero from what it was told, as LinuxCNC's manual has it; they are the joints' homes.
-    ini = ini_of(tmp_path / "pentakins/pentapod.ini")
+    ini, machine = ini_of(tmp_path / "kinematics/pentapod.ini"), what.machine
+    assert ini["KINS"]["KINEMATICS"] == "pentapod_kins"
+    rng = np.random.default_rng(0)
+    tips = machine.work.centre + rng.uniform(-0.6, 0.6, (20_000, 3))
+    axes = rng.normal(size=tips.shape) - [0.0, 0.0, 2.0]
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    legs = machine.robot.leg_lengths(tips + machine.tool_length * axes, -axes)
+    reached = ((legs > machine.legs.min_length) & (legs < machine.legs.max_length)).all(axis=1)
+    there = MM * (tips[reached] - machine.work.centre) * [1.0, -1.0, -1.0]
+    assert reached.sum() > 300
+    for k, letter in enumerate("XYZ"):
+        limits = ini[f"AXIS_{letter}"]
+        assert float(limits["MIN_LIMIT"]) <= there[:, k].min() < there[:, k].max() <= float(limits["MAX_LIMIT"])
+    home = machine.work.centre - [0.0, 0.0, machine.tool_length]
     homes = [float(ini[f"JOINT_{k}"]["HOME"]) for k in range(5)]
-    joints = np.column_stack([np.zeros(5), np.zeros(5), reach])
-    assert np.abs(np.linalg.norm(joints - base, axis=1) - homes).max() < 1e-6
+    assert np.abs(MM * machine.robot.leg_lengths(home, np.array([0.0, 0.0, 1.0])) - homes).max() < 1e-9
+
+
+def test_readme_says_where_the_module_would_refuse_the_toolpath(tmp_path):
+    what = given(duration=0.2)
+    post(what, "linuxcnc", tmp_path / "far")
+    assert "refuses blocks" not in (tmp_path / "far/README.md").read_text(encoding="utf-8")
+    down = RigidTransform(np.eye(3), np.array([0.0, 0.0, -0.265]))  # towards the base, and S = 0
+    post(dataclasses.replace(what, toolpath=what.toolpath.transformed(down)), "linuxcnc", tmp_path / "near")
+    told = (tmp_path / "near/README.md").read_text(encoding="utf-8")
+    assert re.search(r"refuses blocks .* until you lower `pentapod\.least\.surface` \(it has [0-9.]+, 20 is", told)
 
 
 def test_the_machine_must_be_the_programs(tmp_path):

@@ -95,7 +95,7 @@ def test_a_run_is_posted_as_it_was_planned(make_job, tmp_path, capsys):
     job, out = make_job(), tmp_path / "out"
     assert run(["plan", str(job), "-o", str(out), "--quiet"]) == 0
     assert run(["post", str(out / "program.csv"), "--to", "linuxcnc", "-o", str(tmp_path / "posted")]) == 0
-    assert (tmp_path / "posted" / "pentakins" / "play.sh").is_file()
+    assert (tmp_path / "posted" / "kinematics" / "play.sh").is_file()
     # Alone, it is judged anew.
     program = read_csv(out / "program.csv")
     (alone := tmp_path / "alone").mkdir()

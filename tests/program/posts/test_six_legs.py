@@ -50,7 +50,10 @@ def test_linuxcnc_has_an_axis_for_each_leg(tmp_path) -> None:
     assert "coordinates=XYZUVW" in (tmp_path / "trivkins/pentapod.ini").read_text()
     assert "JOINTS = 6" in (tmp_path / "trivkins/pentapod.ini").read_text()
     assert "names=leg1,leg2,leg3,leg4,leg5,leg6" in (tmp_path / "stream/stream.hal").read_text()
-    assert not (tmp_path / "pentakins").exists()
+    assert not (tmp_path / "kinematics").exists()
+    told = (tmp_path / "README.md").read_text(encoding="utf-8")
+    assert "no kinematics module for such a machine" in told
+    assert "play the setpoints (stream/)" in told
 
 
 @pytest.mark.slow

@@ -83,6 +83,28 @@ def check(name_or_file: str, as_json: bool, quiet: bool) -> int:
     return 0 if passed else 1
 
 
+@machine.command("linuxcnc")
+@click.argument("name_or_file")
+@click.option("-o", "--out", type=click.Path(path_type=Path), required=True, help="Folder to write.")
+@json_option
+@quiet_option
+def linuxcnc(name_or_file: str, out: Path, as_json: bool, quiet: bool) -> int:
+    """Write a kinematics module for LinuxCNC with a simulation, to drive a machine (NAME or FILE.toml) by hand.
+
+    For the quadratic family, as designed or as measured. `pentapod post --to linuxcnc` adds a program's toolpath.
+    """
+    from pentapod.machine import Machine
+    from pentapod.program.posts.linuxcnc.kinematics import upright_component, write_kinematics
+
+    made = Machine.load(name_or_file)
+    files = write_kinematics(made, upright_component(made), out)
+    if as_json:
+        echo_json({"machine": made.name, "digest": made.digest, "files": [str(file) for file in files]})
+    elif not quiet:
+        click.echo(f"{out}: kinematics module and simulation of {made.name}; see {out / 'README.md'}")
+    return 0
+
+
 @machine.command("drift")
 @click.argument("first", type=click.Path(path_type=Path))
 @click.argument("second", type=click.Path(path_type=Path))

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from pentapod.base.errors import InputError
-from pentapod.base.files import atomic_write
 from pentapod.base.registry import Registry
 from pentapod.base.values import Value
 from pentapod.machine.machine import Machine
 from pentapod.program.csv import csv_bytes
+from pentapod.program.posts.files import write_files
 from pentapod.program.posts.verified import VerdictContent, check_passed, marked_unverified
 from pentapod.program.program import Program
 from pentapod.program.resolution import quantised
@@ -126,20 +126,7 @@ def write_post(
     contents = post.write(replace(given, program=replace(program, provenance=source)))
     if unverified:
         contents = {relative: marked_unverified(relative, content) for relative, content in contents.items()}
-    made: list[Path] = []
-    for relative, content in contents.items():
-        path = Path(folder) / relative
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            what = f"the folder cannot be created: {(error.strerror or str(error)).lower()}"
-            raise InputError(what, file=path.parent, remedy="choose another") from error
-        with atomic_write(path) as temporary:
-            temporary.write_bytes(content)
-            if content.startswith(b"#!"):
-                temporary.chmod(temporary.stat().st_mode | 0o111)
-        made.append(path)
-    return made
+    return write_files(contents, folder)
 
 
 def read_post(folder: str | Path, name: str, machine: Machine | None = None) -> Program | Toolpath:

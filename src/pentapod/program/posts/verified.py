@@ -15,7 +15,8 @@ VerdictContent = Mapping[str, Any] | str | Path
 
 _REMEDY = "plan the job or verify the program (pentapod verify --json > verdict.json), or insist with --unverified"
 _COMMENTS = {
-    ".apt": "$$ {}", ".hal": "# {}", ".ini": "# {}", ".md": "**{}**", ".ngc": "({})", ".sdf": "<!-- {} -->",
+    ".apt": "$$ {}", ".c": "/* {} */", ".h": "/* {} */",
+    ".hal": "# {}", ".ini": "# {}", ".md": "**{}**", ".ngc": "({})", ".sdf": "<!-- {} -->",
     ".tbl": "; {}", ".var": "# {}", ".xml": "<!-- {} -->",
 }  # fmt: skip
 _ARCHIVES = (".npz", ".h5")

@@ -4,31 +4,37 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pentapod.kinematics.five_legs import FiveLegs
-from pentapod.kinematics.legs_on_rings import LegsOnRings
+from pentapod.base.errors import MachineError
 from pentapod.program.posts.drives import HALSTREAMER
-from pentapod.program.posts.linuxcnc import pentakins, stream, trivkins
+from pentapod.program.posts.linuxcnc import kinematics, stream, trivkins
 from pentapod.program.posts.linuxcnc.config import packaged
 from pentapod.program.posts.registry import Post, PostInput, register
 from pentapod.program.program import Program
 from pentapod.toolpath.toolpath import Toolpath
 
-__all__ = ["LINUXCNC", "pentakins", "stream", "trivkins"]
+__all__ = ["LINUXCNC", "kinematics", "stream", "trivkins"]
 
 
 def _write(given: PostInput) -> dict[str, bytes]:
     folders = {"stream": stream.stream_files(given), "trivkins": trivkins.trivkins_files(given)}
-    if given.toolpath is not None and isinstance(given.the_machine().robot, FiveLegs | LegsOnRings):
-        folders["pentakins"] = pentakins.pentakins_files(given)
+    program, note = given.program, ""
+    try:
+        of_machine = given.the_machine(), program.component, program.period, given.toolpath
+        folders["kinematics"] = kinematics.kinematics_files(*of_machine)
+        if given.toolpath is not None:
+            note = kinematics.nearer_than_least(given.the_machine(), program.component, given.toolpath)
+    except MachineError as error:
+        note = f"It is not here: {error}.\n"
     files = {f"{folder}/{name}": content for folder, files in folders.items() for name, content in files.items()}
     machine = given.the_machine()
     words = {
-        "allowed": trivkins.planner_acceleration(given.program, machine).max(),
-        "limit": 1e3 * machine.legs.max_acceleration.min(),
+        "allowed": f"{trivkins.planner_acceleration(program, machine).max():.0f}",
+        "limit": f"{1e3 * machine.legs.max_acceleration.min():.0f}",
+        "note": note,
     }
     text = packaged("README.md").decode()
     for name, value in words.items():
-        text = text.replace(f"{{{name}}}", f"{value:.0f}")
+        text = text.replace(f"{{{name}}}", value)
     return {"README.md": text.encode(), **files}
 
 
@@ -39,7 +45,7 @@ def _read(folder: Path) -> Program | Toolpath:
 LINUXCNC = register(
     Post(
         "linuxcnc",
-        "LinuxCNC: setpoints with HAL, G-code of the legs, tool path for pentakins",
+        "LinuxCNC: setpoints with HAL, G-code of the legs, a kinematics module with the tool path",
         _write,
         _read,
         takes_toolpath=True,

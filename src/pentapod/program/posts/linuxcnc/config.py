@@ -76,12 +76,8 @@ def joint_words(home: Floats, low: Floats, high: Floats, velocity: Floats, accel
     return joints
 
 
-def hal_text(legs: int, parameters: Mapping[str, float] | None = None, zeros: Floats | None = None) -> str:
-    """Return the HAL of a simulation: a command is its own feedback. parameters: name → value, set at the end.
-
-    legs: how many. zeros (n,): mm by which the scales read more than the lengths that the kinematics computes. Where
-    there are any, the signals scale1, scale2, ... are what the scales read: commands for drives with absolute scales.
-    """
+def hal_text(legs: int) -> str:
+    """Return the HAL of a simulation of so many legs: a command is its own feedback."""
     lines = [
         "loadrt [KINS]KINEMATICS",
         "loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS",
@@ -91,43 +87,28 @@ def hal_text(legs: int, parameters: Mapping[str, float] | None = None, zeros: Fl
         "net tool-prep-loop iocontrol.0.tool-prepare iocontrol.0.tool-prepared",
         "net tool-change-loop iocontrol.0.tool-change iocontrol.0.tool-changed",
         *(f"net leg{k + 1} joint.{k}.motor-pos-cmd => joint.{k}.motor-pos-fb" for k in range(legs)),
-        *(f"setp {name} {number(value)}" for name, value in (parameters or {}).items()),
-        *(_scales(zeros) if zeros is not None and zeros.any() else ()),
     ]
     return "\n".join(lines) + "\n"
 
 
-def _scales(zeros: Floats) -> list[str]:
-    lines = [f"loadrt offset count={len(zeros)}"]
-    for k, zero in enumerate(zeros.tolist()):
-        lines += [
-            f"addf offset.{k}.update-output servo-thread",
-            f"setp offset.{k}.offset {number(zero)}",
-            f"net length{k + 1} joint.{k}.pos-cmd => offset.{k}.in",
-            f"net scale{k + 1} offset.{k}.out",
-        ]
-    return lines
-
-
-def record_text(legs: int, *, scales: bool = False) -> str:
-    """Return the HAL that records each joint's command, and the kind of motion; scales: what the scales read."""
-    command = "net scale{0}" if scales else "net command{0} joint.{1}.pos-cmd"
+def record_text(legs: int) -> str:
+    """Return the HAL that records each joint's command, and the kind of motion."""
     lines = [
         f"loadrt sampler depth=16000 cfg={'f' * legs}s",
         "addf sampler.0 servo-thread",
-        *(f"{command.format(k + 1, k)} => sampler.0.pin.{k}" for k in range(legs)),
+        *(f"net command{k + 1} joint.{k}.pos-cmd => sampler.0.pin.{k}" for k in range(legs)),
         f"net kind-of-motion motion.motion-type => sampler.0.pin.{legs}",
     ]
     return "\n".join(lines) + "\n"
 
 
-def files_of(ini: str, hal: str, program: str, code: bytes, legs: int, *, scales: bool = False) -> dict[str, bytes]:
-    """Return the files of a configuration's folder; program: the name of the G-code file; scales: as `record_text`."""
+def files_of(ini: str, hal: str, program: str, code: bytes, legs: int) -> dict[str, bytes]:
+    """Return the files of a configuration's folder; program: the name of the G-code file."""
     return {
         program: code,
         "pentapod.ini": ini.encode(),
         "pentapod.hal": hal.encode(),
-        "record.hal": record_text(legs, scales=scales).encode(),
+        "record.hal": record_text(legs).encode(),
         "tool.tbl": b"T1 P1 Z0 D0 ;\n",
         "linuxcnc.var": b"",
         "headless": packaged("headless"),

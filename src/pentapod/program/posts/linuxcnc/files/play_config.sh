@@ -5,8 +5,8 @@ cd "$(dirname "$0")"
 command -v linuxcnc >/dev/null || { echo "play.sh needs LinuxCNC: the package linuxcnc-uspace" >&2; exit 1; }
 if [ "${1:-}" != inside ]; then
   # linuxcncsvr listens on all addresses: no network. Its own shared memory as well.
-  if unshare --net --ipc true 2>/dev/null; then exec unshare --net --ipc sh play.sh inside; fi
-  exec unshare --map-current-user --keep-caps --net --ipc sh play.sh inside
+  if unshare --net --ipc --mount true 2>/dev/null; then exec unshare --net --ipc --mount sh play.sh inside; fi
+  exec unshare --map-current-user --keep-caps --net --ipc --mount sh play.sh inside
 fi
 ip link set lo up
 scratch=$(mktemp -d)
@@ -15,6 +15,16 @@ trap 'rm -rf "$scratch" headless.ini' EXIT
 # Root may not run real-time parts as itself; for anyone else RTAPI_UID has no meaning.
 export RTAPI_UID=65534 RTAPI_FIFO_PATH="$scratch/fifo" HOME="$scratch"
 unset PYTHONPATH || true
+if [ -f install.sh ]; then
+  # The module is built here, and seen among LinuxCNC's own by this process alone.
+  modules=${EMC2_RTLIB_DIR:-/usr/lib/linuxcnc/modules}
+  cp -r "$modules" "$scratch/modules"
+  sh install.sh "$scratch/modules"
+  # Not by mount(8), which only root may call: 4096 is MS_BIND.
+  /usr/bin/python3 -c 'import ctypes, sys
+sys.exit(ctypes.CDLL(None).mount(sys.argv[1].encode(), sys.argv[2].encode(), None, 4096, None) != 0)' \
+    "$scratch/modules" "$modules" || { echo "play.sh may not show the module to LinuxCNC: sh install.sh first" >&2; exit 1; }
+fi
 sed -e 's/^DISPLAY = .*/DISPLAY = .\/headless/' -e 's/^# HALFILE/HALFILE/' pentapod.ini > headless.ini
 # To a file: the real-time process inherits a pipe and would keep it open.
 echo "playing in real time; LinuxCNC's own words go to linuxcnc.log"

@@ -1,0 +1,112 @@
+"""The kinematics module for LinuxCNC: asked and reached. Microseconds of CPU, differences, cold starts.
+
+Compiled as halcompile does (-Os). Jogs in LinuxCNC itself: PENTAPOD_JOG_POSES=200 pytest
+tests/program/posts/test_linuxcnc_by_hand.py -m slow, 40 s a pose.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from compiled_kinematics import Compiled, calibrated, poses, world_of
+from linuxcnc_kinematics import MODULE, asked
+from pentapod.kinematics import AsBuiltPentapod
+from pentapod.machine import Machine
+
+LEAST = np.array([0.1, 20.0, 0.0, 0.0, 0.0, 1.0, 1.0])
+FAST = np.array([1000.0, 1000.0, 1000.0, 289.4, 289.4])
+ROUNDS = 7
+
+
+def microseconds(work: Callable[[], object], count: int) -> float:
+    """Return the least CPU time of a few rounds, by one of `count`."""
+    found = np.inf
+    for _ in range(ROUNDS):
+        start = time.process_time()
+        work()
+        found = min(found, time.process_time() - start)
+    return 1e6 * found / count
+
+
+def row(what: str, bound: str, reached: str) -> None:
+    """Print one line of the table."""
+    print(f"{what:<58}{bound:>14}{reached:>16}")
+
+
+def speeds(name: str, machine: Machine, module: Compiled, count: int) -> None:
+    """Time forward and inverse kinematics and the guard."""
+    p, i = poses(machine, count)
+    world = world_of(machine, p, i)
+    legs, _ = module.inverses(world)
+    row(f"{name}: legs to XYZAB, µs", "0.2", f"{microseconds(lambda: module.worlds(legs), count):.3f}")
+    row(
+        f"{name}: XYZAB to legs with all margins, µs",
+        "0.3",
+        f"{microseconds(lambda: module.inverses(world), count):.3f}",
+    )
+    here = np.cumsum(np.tile([1e-5, -2e-5, 1e-5, 2e-6, -1e-6], (count, 1)), axis=0)
+    moving, _ = module.inverses(here)
+    guard = microseconds(lambda: module.guards(moving, False, LEAST, FAST), count)
+    row(f"{name}: guard, µs", "3", f"{guard:.3f}")
+
+
+def starts(name: str, machine: Machine, module: Compiled, count: int) -> None:
+    """Count cold starts that end elsewhere, or nowhere."""
+    wrong = missing = 0
+    largest = 0.0
+    for seed in range(max(count // 200_000, 1)):
+        p, i = poses(machine, min(count, 200_000), seed + 1)
+        found = module.lines(1e3 * machine.robot.leg_lengths(p, i))
+        off = np.abs(found[:, :3] - 1e3 * p).max(axis=1)
+        missing += int(np.isnan(off).sum())
+        wrong += int((off > 1e-6).sum())
+        largest = max(largest, float(np.nanmax(off)))
+    row(f"{name}: cold starts wrong, of {count}", "0", str(wrong))
+    row(f"{name}: cold starts without a pose, of {count}", "0", str(missing))
+    row(f"{name}: largest error of a point, mm", "", f"{largest:.1e}")
+
+
+def against_pentakins(module: Compiled, folder: Path) -> None:
+    """Compare legs with those of LinuxCNC's own pentakins."""
+    machine = Machine.load("desk")
+    p, i = poses(machine, 2000)
+    tilts = np.degrees(np.stack([np.arcsin(-i[:, 1]), np.arctan2(i[:, 0], i[:, 2])], axis=1))
+    theirs, _, _ = asked(AsBuiltPentapod.of(machine.robot), p, tilts, folder)
+    ours, _ = module.inverses(world_of(machine, p, i))
+    row("desk: legs against pentakins, mm", "1e-9", f"{np.abs(ours - 1e3 * theirs).max():.1e}")
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--starts", type=int, default=1_000_000)
+    count = parser.parse_args().starts
+    compiler = subprocess.run(["cc", "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
+    print(compiler)
+    row("", "asked", "reached")
+    machines = {
+        "desk": Machine.load("desk"),
+        "as built": calibrated(3),
+        "as built, rings of 12 mm": calibrated(4, 0.012),
+    }
+    with tempfile.TemporaryDirectory() as scratch:
+        for name, machine in machines.items():
+            module = Compiled(machine, Path(scratch) / name.replace(" ", "-"), ("-Os",))
+            speeds(name, machine, module, 100_000)
+            starts(name, machine, module, count)
+            if name == "desk" and MODULE.exists():
+                against_pentakins(module, Path(scratch))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,181 @@
+"""The kinematics module for LinuxCNC: C with the numbers of one machine, for the quadratic family, nominal or as built.
+
+The mathematics is a header of its own, without HAL: other controllers and simulators can include it, and the tests call
+it through ctypes. Numbers are hexadecimal, so that the compiler reads them exactly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pentapod.base.errors import MachineError
+from pentapod.base.version import __version__
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import Component
+from pentapod.kinematics.families.as_built import AsBuiltPentapod
+from pentapod.kinematics.families.quadratic import LinearPentapod
+from pentapod.kinematics.forward.quadratic import LinearPart
+from pentapod.kinematics.robot import Branch, own_branch
+from pentapod.machine.clearance.collision_world import spindle_ends
+from pentapod.machine.machine import Machine
+from pentapod.planning.limits.leg_pairs import LegPairClearance
+from pentapod.planning.limits.limit import Scene
+from pentapod.planning.limits.platform_joints import PlatformJointAngle
+from pentapod.program.posts.linuxcnc.config import packaged
+
+SOURCES = ("pentapod_kinematics.h", "pentapod_kins.c", "pins_2.9.h", "pins_dev.h", "install.sh", "README.md")
+"""Files of the module."""
+
+
+@dataclass(frozen=True)
+class LeastMargins:
+    """What must be left in every pose, beyond the machine's own limits; in the order of the module's margins.
+
+    w: sine of the angle between tool axis and base plane. surface_mm: to the singular surface S = 0. stroke_mm: of each
+    leg. base_cone, platform_joint: differences of cosines. leg_gap_mm, shaft_gap_mm: between legs, and to the spindle.
+    """
+
+    w: float = 0.1
+    surface_mm: float = 20.0
+    stroke_mm: float = 0.0
+    base_cone: float = 0.0
+    platform_joint: float = 0.0
+    leg_gap_mm: float = 1.0
+    shaft_gap_mm: float = 1.0
+
+
+@dataclass(frozen=True)
+class GuardOptions:
+    """How the guard foresees where a motion stops.
+
+    jog_share, path_share: of the axes' accelerations, with which jogs and programs slow down; LinuxCNC's planner does
+    so with 0.6 of them on blended blocks. lead_periods: servo periods from a command to what is done about it.
+    slack: of cosines, by which a pose of another component may be beyond the cones and still count as possible.
+    """
+
+    jog_share: float = 0.9
+    path_share: float = 0.45
+    lead_periods: float = 4.0
+    slack: float = 0.01
+
+
+LEAST = LeastMargins()
+GUARD = GuardOptions()
+
+
+@dataclass(frozen=True, eq=False)
+class Module:
+    """What the module is made for. frame: machine → controller. accelerations: of X Y Z A B, mm/s² and deg/s²."""
+
+    machine: Machine
+    component: Branch
+    frame: RigidTransform
+    accelerations: tuple[float, ...]
+
+
+def module_files(given: Module) -> dict[str, bytes]:
+    """Return the files of the module by name. Raises MachineError where the machine can have none."""
+    machine = given.machine
+    words = {**_identity(given), **_design(given), **_as_it_is(machine), **_limits(machine), **_pairs(given)}
+    words |= {"LEAST": _numbers([getattr(LEAST, item.name) for item in fields(LEAST)])}
+    words |= {item.name.upper(): _numbers(getattr(GUARD, item.name)) for item in fields(GUARD)}
+    words |= {"ACCELERATION": _numbers(given.accelerations)}
+    return {name: _filled(packaged(f"kinematics/{name}").decode(), words).encode() for name in SOURCES}
+
+
+def nominal_robot(machine: Machine) -> LinearPentapod:
+    """Return the design of a machine that can have the module. Raises MachineError."""
+    robot = machine.robot
+    nominal = robot.nominal if isinstance(robot, AsBuiltPentapod) else robot
+    remedy = "play the setpoints (stream/), or the legs as axes (trivkins/)"
+    if not isinstance(nominal, LinearPentapod) or machine.limb is not None:
+        raise MachineError(
+            "there is no kinematics module for such a machine", key="family", value=type(nominal).__name__,
+            expected="the quadratic family, as designed or as measured: delta in [geometry]", remedy=remedy,
+        )  # fmt: skip
+    if machine.leg_model.is_needed:
+        raise MachineError(
+            "the kinematics module commands lengths of legs, but these drives are told something else", key="leg_model",
+            expected="drives without screw coupling, expansion, pitch errors and backlash", remedy=remedy,
+        )  # fmt: skip
+    return nominal
+
+
+def _identity(given: Module) -> dict[str, str]:
+    machine, component = given.machine, _component(given)
+    name = "".join(letter for letter in machine.name if letter.isprintable()).replace("*/", "").replace("@", "")
+    return {
+        "NAME": name.replace("\\", ""), "DIGEST": machine.digest, "COMPONENT": str(component), "VERSION": __version__,
+        "DIGEST_HIGH": machine.digest[:8], "DIGEST_LOW": machine.digest[8:],
+        "TOOL_LENGTH": _numbers(1e3 * machine.tool_length),
+        "TURN": _numbers(np.diag(given.frame.rotation)), "SHIFT": _numbers(1e3 * given.frame.translation),
+    }  # fmt: skip
+
+
+def _component(given: Module) -> Component:
+    return Component(*own_branch(nominal_robot(given.machine), given.component))
+
+
+def _design(given: Module) -> dict[str, str]:
+    nominal, component = nominal_robot(given.machine), _component(given)
+    # In millimetres from the start: exact numbers of this geometry, rounded once.
+    base = 1e3 * nominal.base
+    linear = LinearPart.of(base, nominal.delta)
+    return {
+        "X3": _numbers(base[2, 0]), "Y3": _numbers(base[2, 1]), "Z3": _numbers(1e3 * nominal.offsets[2]),
+        "DELTA": _numbers(nominal.delta), "SIGN_W": _numbers(component.w), "SIGN_S": _numbers(component.s),
+        "LINEAR": _numbers(np.column_stack([linear.linear_map, linear.constant])),
+    }  # fmt: skip
+
+
+def _as_it_is(machine: Machine) -> dict[str, str]:
+    robot = machine.robot if isinstance(machine.robot, AsBuiltPentapod) else nominal_robot(machine)
+    return {
+        "AS_BUILT": str(int(isinstance(robot, AsBuiltPentapod))), "BASE": _numbers(1e3 * robot.base_joints.T),
+        "OFFSET": _numbers(1e3 * robot.offsets), "RING": _numbers(1e3 * robot.radii),
+        "ZERO": _numbers(1e3 * robot.zeros),
+    }  # fmt: skip
+
+
+def _limits(machine: Machine) -> dict[str, str]:
+    legs, joints, bodies = machine.legs, machine.joints, machine.bodies
+    return {
+        "SHORTEST": _numbers(1e3 * legs.min_length), "LONGEST": _numbers(1e3 * legs.max_length),
+        "RATE": _numbers(1e3 * legs.max_velocity), "CONE_AXIS": _numbers(joints.base_axes.T),
+        "CONE_COSINE": _numbers(np.cos(joints.base_cone)), "LEG_DIAMETER": _numbers(2e3 * bodies.leg_radius),
+        "SHAFT_AND_LEG": _numbers(1e3 * (bodies.shaft_radius + bodies.leg_radius)),
+        "JOINED": _numbers(1e3 * bodies.joint_radius), "SHAFT": _numbers(1e3 * np.array(spindle_ends(machine))),
+    }  # fmt: skip
+
+
+def _pairs(given: Module) -> dict[str, str]:
+    scene = Scene(given.machine, own_branch(given.machine.robot, given.component))
+    pairs, base = LegPairClearance.of(scene), 1e3 * given.machine.robot.base_joints
+    ends = PlatformJointAngle.of(scene)
+    edges = [[limit.edge for limit in ends if limit.widest == widest] for widest in (True, False)]
+    return {
+        "BETWEEN": _numbers(np.transpose([base[pair.second] - base[pair.first] for pair in pairs])),
+        "SIDE": _numbers([pair.side for pair in pairs]), "JOINT_COSINE": _numbers(edges),
+    }  # fmt: skip
+
+
+def _numbers(value: ArrayLike) -> str:
+    """Return a number, or nested lists of them, as C: small whole numbers as they are, others hexadecimal."""
+    array = np.asarray(value, dtype=np.float64)
+    if array.ndim:
+        return "{" + ", ".join(_numbers(one) for one in array) + "}"
+    number = float(array)
+    if not math.isfinite(number):
+        raise MachineError("not a number of a machine", key="kinematics module", value=number)
+    return f"{number:.1f}" if number == int(number) and abs(number) < 1e6 else number.hex()
+
+
+def _filled(text: str, words: Mapping[str, str]) -> str:
+    for name, value in words.items():
+        text = text.replace(f"@{name}@", value)
+    return text
