@@ -72,6 +72,7 @@ class Job(Value):
     tolerance = _TableOf()
     placement = _TableOf()
     fixture = _TableOf()
+    process = _TableOf()
     output = _TableOf()
     limits = _TableOf()
     verify = _TableOf()
@@ -163,6 +164,8 @@ class Job(Value):
         content = self.tables.model_dump(mode="json", exclude={"verify"})
         if not self.limits.use:
             del content["limits"]
+        if all(value is None for value in content["process"].values()):
+            del content["process"]
         if not self.part.flip:
             del content["part"]["flip"]
         content["part"]["mesh"] = [self.mesh_path.suffix.lower(), _sha(self.mesh_path)]

@@ -20,6 +20,8 @@ def _write(given: PostInput) -> dict[str, bytes]:
     folders = {"stream": stream.stream_files(given), "trivkins": trivkins.trivkins_files(given)}
     if given.toolpath is not None and isinstance(given.the_machine().robot, FiveLegs | LegsOnRings):
         folders["pentakins"] = pentakins.pentakins_files(given)
+    tools = {"tool.tbl": trivkins.tool_table(given.program)}
+    folders = {folder: {**files, **tools} if "tool.tbl" in files else files for folder, files in folders.items()}
     files = {f"{folder}/{name}": content for folder, files in folders.items() for name, content in files.items()}
     machine = given.the_machine()
     words = {
