@@ -11,15 +11,16 @@ from scipy.interpolate import make_interp_spline
 from pentapod.base.errors import ArrayError, InputError, ProgramError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics import Component
-from pentapod.program import quantised, write_csv
+from pentapod.program import Switch, quantised, write_csv
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.verify import CLAIMS, verify, write_verdict
+from pentapod.verify import CLAIMS, Replay, Specification, verify, write_verdict
 
 GEOMETRY = {"tip deviation", "toolpath covered"}
 CUTTING = cases.cutting_of(*cases.hill())
 NOT_ASKED = {
     "legs, spindle and tool clear of the surroundings",  # one claim where nobody told what is there
     "component as asked",
+    "process data",
     "every cut is made in one set-up",
 }
 FEEDS = {"feed on cuts", "feed on links", "rapid rate"}
@@ -297,6 +298,35 @@ def test_loop_added(good):
     lift, forth, back = spark_out()
     once = replace(good, toolpath=cases.toolpath_of([lift, forth]))
     assert failed(judge(with_poses(once, *cases.timed([lift, forth, back, forth])))) >= {"tip deviation"}
+
+
+def processed(case):
+    """The case with coolant from its first cut on, and a laser that is on in its cuts."""
+    times = Replay(case.program, Specification(case.machine, case.toolpath, **cases.ASKED)).match.times
+    starts = np.rint(0.5 * times[case.toolpath.starts]).astype(int).tolist()
+    power, segments = np.zeros(len(case.program.legs)), list(case.toolpath.segments)
+    for k, segment in enumerate(segments):
+        share = 0.5 * (segment.kind is SegmentKind.CUT)
+        power[starts[k] : starts[k + 1]] = share
+        segments[k] = replace(segment, words=(*(("M8",) if k == 1 else ()), f"M67 E0 Q{share:g}"))
+    program = replace(case.program, switches=(Switch(starts[1], ("M8",)),), laser_power=power)
+    return replace(case, program=program, toolpath=replace(case.toolpath, segments=tuple(segments)))
+
+
+def process_data(case):
+    return next(each for each in judge(case).certificates if each.claim == "process data")
+
+
+def test_process_data_as_the_toolpath_says_pass_and_others_fail(linear):
+    case = processed(linear)
+    found = process_data(case)
+    assert found.passed, found.method
+    assert found.value < found.bound
+    row = case.program.switches[0].row
+    late = (Switch(row + 300, ("M8",)),)
+    on = np.full(len(case.program.legs), 0.5)
+    for wrong in ({"switches": ()}, {"switches": late}, {"laser_power": None}, {"laser_power": on}):
+        assert not process_data(replace(case, program=replace(case.program, **wrong))).passed, wrong
 
 
 def test_reversed_path(good):

@@ -22,6 +22,7 @@ from pentapod.planning.placement.common_axes import FIXED
 from pentapod.planning.plan import PlacementOptions, fits
 from pentapod.planning.problem.constraints import FREE
 from pentapod.program import Program, Provenance, sample, write_csv
+from pentapod.program.process import with_process
 from pentapod.timing import Explanation, JerkOptions, Limit, Trajectory, certify, explain, retime, slow_cuts
 from pentapod.timing.jerk.options import DEFAULTS
 from pentapod.timing.reuse import retime_as_before
@@ -191,5 +192,6 @@ class Task:
             calibration=machine.calibration_name, left_out=self.left_out, upright=self.job.asked is not None,
         )  # fmt: skip
         program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
+        program = with_process(program, trajectory, self.toolpath)
         write_csv(program, file)
         return program

@@ -12,13 +12,13 @@ import numpy as np
 from pentapod.base.errors import ProgramError
 from pentapod.base.files import atomic_write
 from pentapod.base.refusal import stage
-from pentapod.program.csv_rows import TimeCheck, columns_of, read_rows, rows_text
+from pentapod.program.csv_rows import POWER_DECIMALS, TimeCheck, columns_of, read_rows, rows_text
 from pentapod.program.header import MAGIC, Header, header_text, parse_header
 from pentapod.program.program import FORMAT_VERSION, Program
 from pentapod.program.resolution import MM_DECIMALS, to_millimetres
 
 ROWS_AT_ONCE = 20_000
-LONGEST_LINE, MOST_LINES = 65_536, 1_000  # of the header: bytes, and lines
+LONGEST_LINE, MOST_LINES = 1 << 22, 1_000  # of the header: bytes in all, and lines
 
 
 @stage
@@ -55,8 +55,11 @@ def read_csv(path: str | Path) -> Program:
     with _opened(file) as source:
         header, first_line = _header(source, file)
         times = TimeCheck(header.period, _time_decimals(header.period))
-        legs = read_rows(source, header.rows, header.legs, times, first_line, file)
-    return header.program(legs)
+        names = columns_of(header.legs, powered=header.powered).split(",")
+        rows = read_rows(source, header.rows, names, times, first_line, file)
+    if header.powered:
+        return header.program(rows[:, :-1], rows[:, -1])
+    return header.program(rows)
 
 
 def read_header(path: str | Path) -> Header:
@@ -68,12 +71,14 @@ def read_header(path: str | Path) -> Header:
 
 def _pieces(program: Program) -> Iterator[bytes]:
     """Yield the file in pieces, so that a long program is never in memory as text as a whole."""
-    yield (header_text(program) + columns_of(program.legs.shape[1]) + "\n").encode()
-    decimals = np.array([_time_decimals(program.period), *[MM_DECIMALS] * program.legs.shape[1]])
+    power, legs = program.laser_power, program.legs.shape[1]
+    yield (header_text(program) + columns_of(legs, powered=power is not None) + "\n").encode()
+    decimals = [_time_decimals(program.period), *[MM_DECIMALS] * legs, *([] if power is None else [POWER_DECIMALS])]
     for start in range(0, len(program.legs), ROWS_AT_ONCE):
-        legs = to_millimetres(program.legs[start : start + ROWS_AT_ONCE])
-        times = np.arange(start, start + len(legs)) * program.period
-        yield rows_text(np.concatenate([times[:, None], legs], axis=1, dtype=np.float64), decimals)
+        rows = slice(start, start + ROWS_AT_ONCE)
+        columns = [to_millimetres(program.legs[rows]), *([] if power is None else [power[rows, None]])]
+        times = np.arange(start, start + len(columns[0])) * program.period
+        yield rows_text(np.concatenate([times[:, None], *columns], axis=1, dtype=np.float64), np.array(decimals))
 
 
 def _time_decimals(period: float) -> int:
@@ -95,14 +100,15 @@ def _opened(file: Path) -> Generator[BufferedReader]:
 
 def _header(source: BufferedReader, file: Path) -> tuple[Header, int]:
     """Return the header and the line number of the first row, which is read next."""
-    lines: list[str] = []
+    lines, total = list[str](), 0
     line = source.readline(LONGEST_LINE)
     if not line.startswith(b"#"):
         if not line.strip() and not source.read(LONGEST_LINE).strip():
             raise ProgramError("the file is empty", file=file, expected="a pentapod program")
         raise ProgramError("not a pentapod program", file=file, line=1, expected=f"# {MAGIC} = {FORMAT_VERSION}")
     while line.startswith(b"#"):
-        if len(line) >= LONGEST_LINE or len(lines) >= MOST_LINES:
+        total += len(line)
+        if total >= LONGEST_LINE or len(lines) >= MOST_LINES:
             what = "the header is longer than any"
             raise ProgramError(what, file=file, line=len(lines) + 1, expected=f"at most {MOST_LINES} lines")
         if not line.endswith(b"\n"):
@@ -114,6 +120,6 @@ def _header(source: BufferedReader, file: Path) -> tuple[Header, int]:
         line = source.readline(LONGEST_LINE)
     header = parse_header(lines, file)
     names = line.decode(errors="replace").rstrip("\r\n")
-    if names != (expected := columns_of(header.legs)):
+    if names != (expected := columns_of(header.legs, powered=header.powered)):
         raise ProgramError("wrong column names", file=file, line=len(lines) + 1, value=names[:80], expected=expected)
     return header, len(lines) + 2

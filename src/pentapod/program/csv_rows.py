@@ -22,13 +22,15 @@ SAVED_BY_KERNELS = 1.5e-8
 """Seconds for each byte; see `numerics.kernels`."""
 SAVED_BY_WRITING = 1.7e-7
 """Seconds for each number, likewise."""
+POWER, POWER_DECIMALS = "laser_power", 6
+"""Name of the column with the laser's power, and its decimals."""
 _PLAIN = b"0123456789+-.eE,\n\r"
 _TO_COMMAS = bytes.maketrans(b"\n", b",")
 
 
-def columns_of(legs: int) -> str:
-    """Return the line that names the columns of a program for so many legs."""
-    return ",".join(["time_s", *(f"leg{leg + 1}_mm" for leg in range(legs))])
+def columns_of(legs: int, *, powered: bool = False) -> str:
+    """Return the line that names the columns of a program for so many legs; powered: with the laser's power."""
+    return ",".join(["time_s", *(f"leg{leg + 1}_mm" for leg in range(legs)), *((POWER,) if powered else ())])
 
 
 def rows_text(table: Floats, decimals: Ints) -> bytes:
@@ -81,13 +83,16 @@ class TimeCheck:
 
 
 def read_rows(
-    source: BufferedReader, rows: int, legs_of_row: int, times: TimeCheck, first_line: int, file: Path
+    source: BufferedReader, rows: int, names: Sequence[str], times: TimeCheck, first_line: int, file: Path
 ) -> Floats:
-    """Return leg lengths (rows, legs_of_row) in metres from the source's position to its end. Raises ProgramError."""
-    names = columns_of(legs_of_row).split(",")
+    """Return the rows from the source's position to its end, without their times. Raises ProgramError.
+
+    names: of the columns. Leg lengths are in metres; the laser's power, if there is any, is the last column.
+    """
+    width, legs_of_row = len(names) - 1, len(names) - 1 - (names[-1] == POWER)
     shortest = 2 * len(names)  # bytes of a row
     size = os.fstat(source.fileno()).st_size - source.tell()
-    legs = np.empty((0, legs_of_row))
+    legs = np.empty((0, width))
     count, rest = 0, b""
     while block := source.read(BLOCK_BYTES):
         end = block.rfind(b"\n") + 1
@@ -102,12 +107,14 @@ def read_rows(
         data, rest = rest + block[:end], block[end:]
         table = _table(data, names, first_line + count, file)
         times.check(table[:, 0], count, first_line, file)
-        _check_lengths(table, names, first_line + count, file)
+        _check_lengths(table[:, : legs_of_row + 1], names, first_line + count, file)
+        _check_powers(table[:, legs_of_row + 1 :], first_line + count, file)
         if not count:
             # The header may give more rows than the file can hold: no memory for those.
-            legs = np.empty((min(rows, size // shortest + 1), legs_of_row))
+            legs = np.empty((min(rows, size // shortest + 1), width))
         kept = max(0, min(len(table), len(legs) - count))
-        legs[count : count + kept] = from_millimetres(table[:kept, 1:])
+        legs[count : count + kept, :legs_of_row] = from_millimetres(table[:kept, 1 : legs_of_row + 1])
+        legs[count : count + kept, legs_of_row:] = table[:kept, legs_of_row + 1 :]
         count += len(table)
     if rest:
         raise ProgramError("the file ends within a row", file=file, line=first_line + count, remedy="it was truncated")
@@ -174,3 +181,11 @@ def _check_lengths(table: Floats, names: Sequence[str], first_line: int, file: P
         raise ProgramError(
             what, file=file, line=line, key=names[int(leg) + 1], value=value, expected="between 0 and 10 km"
         )
+
+
+def _check_powers(table: Floats, first_line: int, file: Path) -> None:
+    wrong = (table < 0.0) | (table > 1.0)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        what, value, expected = "not a share of the laser's full power", float(table[row, 0]), "0 to 1"
+        raise ProgramError(what, file=file, line=first_line + row, key=POWER, value=value, expected=expected)

@@ -26,8 +26,10 @@ from pentapod.program.header_values import (
     matrix_text,
     number_of,
     string_text,
+    switches_of,
+    switches_text,
 )
-from pentapod.program.program import FORMAT_VERSION, Program, Provenance
+from pentapod.program.program import FORMAT_VERSION, Program, Provenance, Switch
 from pentapod.toolpath.linking.partition import Piece
 
 MAGIC = "pentapod_program"
@@ -56,11 +58,15 @@ LEFT_OUT = "left_out"
 """Key of programs that leave cuts of the toolpath out: pairs of waypoints."""
 UPRIGHT = "upright"
 """Key of programs whose tool stands along the view, though their job lets it lean."""
+SWITCHES = "switches"
+"""Key of programs that switch spindle, coolant and tool: lists of a row and its words of G-code."""
+LASER_POWER = "laser_power"
+"""Key of programs whose last column is the laser's power, a share of full power from each row to the next."""
 LEGS = "legs"
 """Key of programs for machines that have not as many legs as a linear pentapod."""
 MADE_ON = ("processor", "libraries")
 """Keys of planned programs: on another kind of processor or with other libraries bits may differ."""
-OPTIONAL_KEYS = (LEGS, CALIBRATION, COMMANDS, GUIDES, *SETUP_KEYS, LEFT_OUT, UPRIGHT, *MADE_ON)
+OPTIONAL_KEYS = (LEGS, CALIBRATION, COMMANDS, GUIDES, *SETUP_KEYS, LEFT_OUT, UPRIGHT, SWITCHES, LASER_POWER, *MADE_ON)
 UNVERIFIED = "UNVERIFIED: no verdict has passed this program"
 """First line, after the comment mark, of files written for a controller without a passed verdict."""
 LARGEST_COUNT = 2**63 - 1
@@ -80,11 +86,13 @@ class Header:
     rows: int
     rail_positions: tuple[float, ...] | None = None
     legs: int = FiveLegs.n_legs
+    switches: tuple[Switch, ...] = ()
+    powered: bool = False
 
-    def program(self, legs: Floats) -> Program:
-        """Return the program of this header and its rows (N, n_legs), metres."""
-        before = (self.period, legs, self.interpolation)
-        return Program(*before, self.component, self.placement, self.provenance, self.rail_positions)
+    def program(self, legs: Floats, laser_power: Floats | None = None) -> Program:
+        """Return the program of this header and its rows: legs (N, n_legs), metres, and the laser's power (N,)."""
+        before = (self.period, legs, self.interpolation, self.component, self.placement, self.provenance)
+        return Program(*before, self.rail_positions, self.switches, laser_power)
 
 
 def header_text(program: Program) -> str:
@@ -116,6 +124,10 @@ def header_text(program: Program) -> str:
         values[LEFT_OUT] = f"[{', '.join(f'[{first}, {last}]' for first, last in source.left_out)}]"
     if source.upright:
         values[UPRIGHT] = "true"
+    if program.switches:
+        values[SWITCHES] = switches_text(program.switches)
+    if program.laser_power is not None:
+        values[LASER_POWER] = "true"
     made_on = zip(MADE_ON, (source.processor, source.libraries), strict=True)
     values |= {key: string_text(value) for key, value in made_on if value}
     mark = f"# {UNVERIFIED}\n" if source.unverified else ""
@@ -187,13 +199,15 @@ class _Reader:
                 pentapod_version=self._text("pentapod_version"),
                 piece=self._piece(),
                 left_out=self._left_out(),
-                upright=self._upright(),
+                upright=self._true(UPRIGHT),
                 unverified=self.unverified,
                 **{key: self._text(key) for key in (*MADE_ON, CALIBRATION, COMMANDS) if key in self.values},
             ),
             rows=self._rows(),
             rail_positions=self._rail_positions(),
             legs=self._legs(),
+            switches=self._switches(),
+            powered=self._true(LASER_POWER),
         )
 
     def _check(self, key: str, holds: bool, expected: str) -> None:
@@ -256,10 +270,17 @@ class _Reader:
         self._check(LEFT_OUT, good, "pairs of increasing waypoints, [[first, last], ...]")
         return tuple((first, last) for first, last in pairs)
 
-    def _upright(self) -> bool:
-        if UPRIGHT in self.values:
-            self._check(UPRIGHT, self.values[UPRIGHT] is True, "true, or no such line")
-        return UPRIGHT in self.values
+    def _true(self, key: str) -> bool:
+        if key in self.values:
+            self._check(key, self.values[key] is True, "true, or no such line")
+        return key in self.values
+
+    def _switches(self) -> tuple[Switch, ...]:
+        if SWITCHES not in self.values:
+            return ()
+        found = switches_of(self.values[SWITCHES], self._rows())
+        self._check(SWITCHES, bool(found), 'rising rows of this file, each with its words: [[0, "S12000", "M3"], ...]')
+        return found
 
     def _rows(self) -> int:
         rows = self.values["rows"]

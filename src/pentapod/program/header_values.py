@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable
 from decimal import Decimal
 from typing import Any, cast
 
 from pentapod.base.errors import InputError
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.program.program import Switch
 from pentapod.toolpath.linking.partition import Piece
 
 
@@ -65,3 +67,25 @@ def decimal_text(value: float, shift: int) -> str:
     """Return the shortest digits that give `value` back, times 10^shift, as a TOML float."""
     text = format(Decimal(repr(value)).scaleb(shift), "f")
     return text if "." in text else text + ".0"
+
+
+def switches_text(switches: Iterable[Switch]) -> str:
+    """Return switches as a TOML list of lists: the row, then its words."""
+    each = (", ".join([str(switch.row), *map(string_text, switch.words)]) for switch in switches)
+    return "[" + ", ".join(f"[{switch}]" for switch in each) + "]"
+
+
+def switches_of(value: Any, rows: int) -> tuple[Switch, ...]:
+    """Return the switches of a TOML list of lists, in a program of so many rows; none for anything else."""
+    lists = [list_of(item) for item in list_of(value)]
+    if not all(len(item) > 1 and type(item[0]) is int for item in lists):
+        return ()
+    switches = tuple(Switch(item[0], tuple(item[1:])) for item in lists)
+    at = [switch.row for switch in switches]
+    words: list[Any] = [word for switch in switches for word in switch.words]
+    good = at == sorted(set(at)) and all(0 <= row < rows for row in at)
+    return (
+        switches
+        if good and all(isinstance(word, str) and word.strip() and word.isprintable() for word in words)
+        else ()
+    )

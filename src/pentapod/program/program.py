@@ -50,6 +50,18 @@ class Provenance(Value):
     upright: bool = False
 
 
+@dataclass(frozen=True)
+class Switch(Value):
+    """What is said of spindle, coolant and tool at a row, as words of G-code such as M8.
+
+    >>> Switch(0, ("T3", "M6", "S12000", "M3"))
+    Switch(row=0, words=('T3', 'M6', 'S12000', 'M3'))
+    """
+
+    row: int
+    words: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Program(Result):
     """Setpoints for the legs.
@@ -57,6 +69,8 @@ class Program(Result):
     legs (N, n_legs): lengths in metres; row k has the time k · period seconds. interpolation: of the controller between
     rows, "linear", or "cubic": the C2 cubic spline with zero end velocities. component: in which the motion must stay.
     placement: workpiece → machine. rail_positions: of the guides of a reconfigurable machine, metres; None for others.
+    switches: spindle, coolant and tool, in the order of their rows. laser_power (N,): share of the laser's full power
+    from each row to the next; None where nothing says it.
 
     >>> program.legs.shape[1], round(program.duration, 1) == round(trajectory.duration, 1)
     (5, True)
@@ -71,9 +85,16 @@ class Program(Result):
     placement: RigidTransform
     provenance: Provenance
     rail_positions: tuple[float, ...] | None = None
+    switches: tuple[Switch, ...] = ()
+    laser_power: Floats | None = None
 
     def __post_init__(self) -> None:
         set_frozen(self, legs=frozen(self.legs, "legs", (None, None)))
+        if self.laser_power is not None:
+            set_frozen(self, laser_power=frozen(self.laser_power, "laser_power", (len(self.legs),)))
+        rows = [switch.row for switch in self.switches]
+        if rows != sorted(set(rows)) or (rows and not 0 <= rows[0] <= rows[-1] < len(self.legs)):
+            raise ProgramError("switches must be in the order of their rows", key="switches", value=rows[:8])
         if self.legs.ndim != 2 or len(self.legs) < 2:
             raise ProgramError("a program needs at least two rows", value=self.legs.shape)
         if not (np.isfinite(self.period) and self.period > 0.0):
@@ -117,5 +138,6 @@ class Program(Result):
             ("component", str(self.component)),
             ("machine", self.provenance.machine),
             ("job", self.provenance.job_digest[:12] or "none"),
+            *(("switches", " ".join(switch.words)) for switch in self.switches[:1]),
         )
         return html_table(f"Program: {self.duration:.3f} s", rows)

@@ -69,6 +69,7 @@ def post(
     from pentapod.job.artefacts import ARRAYS, VERDICT
     from pentapod.program import read_csv
     from pentapod.program.posts import PostInput, find_post, placed_toolpath, write_post
+    from pentapod.program.posts.registry import LASER_POWER
     from pentapod.program.posts.verified import check_passed
 
     takes_toolpath = find_post(name).takes_toolpath  # an unknown format fails at once
@@ -86,6 +87,8 @@ def post(
         progress("writing", 0.0, name)
         given = PostInput(read, program_machine(read, program.parent, job, machine), toolpath, digest)
         files = write_post(given, name, out, verdict=verdict, unverified=unverified)
+    if read.laser_power is not None and LASER_POWER in find_post(name).loses:
+        click.echo(f"note: {name} does not hold the laser's power; csv, npz and linuxcnc do", err=True)
     if as_json:
         echo_json({"format": name, "verified": not unverified, "files": [str(file) for file in files]})
     elif not quiet:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pentapod.base.errors import InputError, ProgramError
 from pentapod.base.progress import Progress, silent
+from pentapod.job.build.process import continued, with_process
 from pentapod.job.build.toolpath import drops_gouges, gouge_options, job_link_style, job_toolpath, judged_tool
 from pentapod.job.build.upright import may_stand, upright
 from pentapod.job.schema.job import Job
@@ -34,7 +35,8 @@ def job_part(job: Job, mesh: Mesh, toolpath: Toolpath, piece: Piece, *, machine:
     Raises ToolpathError as `part_of`.
     """
     style = job_link_style(job, mesh, toolpath)
-    return _cleared(job, mesh, part_of(toolpath, piece, style), style, machine)
+    part = _cleared(job, mesh, part_of(toolpath, piece, style), style, machine)
+    return with_process(job, continued(toolpath, part, int(piece.cuts(toolpath).argmax())))
 
 
 def job_without(
@@ -42,7 +44,7 @@ def job_without(
 ) -> Toolpath:
     """Return the job's toolpath as `without_cuts`, with links that are clear of the part. Raises as `without_cuts`."""
     style = job_link_style(job, mesh, toolpath)
-    return _cleared(job, mesh, without_cuts(toolpath, left_out, style), style, machine)
+    return with_process(job, _cleared(job, mesh, without_cuts(toolpath, left_out, style), style, machine))
 
 
 def _cleared(job: Job, mesh: Mesh, part: Toolpath, style: LinkStyle, machine: Machine | None) -> Toolpath:

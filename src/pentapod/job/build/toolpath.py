@@ -19,6 +19,7 @@ from pentapod.cutters.mounted import BallEnded, Mounted
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.solids import Cone
+from pentapod.job.build.process import with_process
 from pentapod.job.build.region import RegionReport, covers_region, job_region, kept_axis, region_report
 from pentapod.job.build.tool import job_tool
 from pentapod.job.build.words import in_words_of
@@ -180,7 +181,7 @@ def job_toolpath(
         reports += _turns(toolpath, from_si(job.axis.si.rate, "deg_mm"))
     if job.feed.dwell_s is not None:
         toolpath = toolpath.stopping(job.feed.dwell_s)
-    return toolpath, Reports(tuple(reports))
+    return with_process(job, toolpath), Reports(tuple(reports))
 
 
 def _along_the_part(

@@ -72,6 +72,7 @@ class Job(Value):
     tolerance = _TableOf()
     placement = _TableOf()
     fixture = _TableOf()
+    process = _TableOf()
     output = _TableOf()
     limits = _TableOf()
     verify = _TableOf()
@@ -165,6 +166,8 @@ class Job(Value):
             del content["limits"]
         if not self.feed.cutting_force_n:
             del content["feed"]["cutting_force_n"]
+        if all(value is None for value in content["process"].values()):
+            del content["process"]
         if not self.part.flip:
             del content["part"]["flip"]
         content["part"]["mesh"] = [self.mesh_path.suffix.lower(), _sha(self.mesh_path)]

@@ -17,6 +17,7 @@ from pentapod.base.tables import TomlTable, table_of, wrong
 from pentapod.base.units import to_si
 from pentapod.job.schema.axis import AxisTable, limited_lean
 from pentapod.job.schema.placement import FixtureTable, PlacementTable
+from pentapod.job.schema.process import ProcessTable
 from pentapod.job.schema.strategies import ToolpathTable, strategy_table
 from pentapod.job.schema.tool import AnyTool, tool_table
 from pentapod.machine.parts import ToolLimits
@@ -215,6 +216,7 @@ _TABLES: dict[str, Any] = {
     "tolerance": (ToleranceTable, ToleranceTable()),
     "placement": (PlacementTable, PlacementTable()),
     "fixture": (FixtureTable, FixtureTable()),
+    "process": (ProcessTable, ProcessTable()),
     "output": (OutputTable, OutputTable()),
     "limits": (LimitsTable, LimitsTable()),
     "verify": (VerifyTable, VerifyTable()),

@@ -1,4 +1,7 @@
-"""HDF5: datasets `time_s` (N,) and `legs_mm` (N, n_legs) with units, the header as an attribute. Needs h5py."""
+"""HDF5: datasets `time_s` (N,), `legs_mm` (N, n_legs) with units, the header as an attribute. Needs h5py.
+
+`laser_power` (N,) is a dataset too, where the program has one.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ from pentapod.base.archives import MOST_UNPACKED, read_arrays
 from pentapod.base.display import load_extra
 from pentapod.base.errors import ProgramError
 from pentapod.base.files import read_bytes
+from pentapod.program.csv_rows import POWER
 from pentapod.program.header import header_text
 from pentapod.program.posts.registry import Post, PostInput, register
 from pentapod.program.posts.rows import of_archive
@@ -35,15 +39,20 @@ try:
 except (ImportError, OSError, ValueError):  # Windows has no limits, macOS not all, and lower ones may be set
     pass
 with h5py.File(source, "r") as archive:
-    header, legs = str(archive.attrs["header"]), archive["legs_mm"]
-    if legs.is_virtual or legs.external or legs.dtype.kind not in "fiu" or legs.dtype.itemsize > 8:
-        sys.exit(1)
-    count = 1
-    for length in legs.shape:
-        count *= int(length)
-    if 8 * count > int(most):
-        sys.exit(4)
-    np.savez(target, header=np.array(header), legs_mm=np.asarray(legs, dtype=np.float64))
+    header, arrays = str(archive.attrs["header"]), {}
+    for name in ("legs_mm", "laser_power"):
+        if name not in archive and name != "legs_mm":
+            continue
+        values = archive[name]
+        if values.is_virtual or values.external or values.dtype.kind not in "fiu" or values.dtype.itemsize > 8:
+            sys.exit(1)
+        count = 1
+        for length in values.shape:
+            count *= int(length)
+        if 8 * count > int(most):
+            sys.exit(4)
+        arrays[name] = np.asarray(values, dtype=np.float64)
+    np.savez(target, header=np.array(header), **arrays)
 """
 
 
@@ -57,6 +66,8 @@ def _write(given: PostInput) -> dict[str, bytes]:
         archive.attrs["header"] = header_text(program)
         for name, values, unit in (("time_s", program.times, "s"), ("legs_mm", to_millimetres(program.legs), "mm")):
             archive.create_dataset(name, data=values).attrs["unit"] = unit
+        if program.laser_power is not None:
+            archive.create_dataset(POWER, data=program.laser_power)
     return {_FILE: packed.getvalue()}
 
 
@@ -79,8 +90,8 @@ def _read(folder: Path) -> Program:
             raise ProgramError("the array is too large", file=file, key="legs_mm", expected=expected)
         if code != 0 or not unpacked.exists():
             raise ProgramError("not an HDF5 file of a program, or a broken one", file=file)
-        arrays = read_arrays(unpacked, ("header", "legs_mm"), ProgramError)
-    return of_archive(arrays["header"], arrays["legs_mm"], file)
+        arrays = read_arrays(unpacked, ("header", "legs_mm"), ProgramError, optional=(POWER,))
+    return of_archive(arrays["header"], arrays["legs_mm"], arrays.get(POWER), file)
 
 
 HDF5 = register(Post("hdf5", "HDF5 archive (extra hdf5)", _write, _read))

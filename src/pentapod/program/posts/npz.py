@@ -1,4 +1,4 @@
-"""NumPy archive: `time_s` (N,), `legs_mm` (N, n_legs), and the header as text."""
+"""NumPy archive: `time_s` (N,), `legs_mm` (N, n_legs), the header as text; `laser_power` (N,) where there is one."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from pentapod.base.archives import read_arrays
 from pentapod.base.errors import ProgramError
 from pentapod.base.files import packed_arrays
+from pentapod.program.csv_rows import POWER
 from pentapod.program.header import header_text
 from pentapod.program.posts.registry import Post, PostInput, register
 from pentapod.program.posts.rows import of_archive
@@ -24,14 +25,15 @@ def _write(given: PostInput) -> dict[str, bytes]:
         "header": np.array(header_text(program)),
         "time_s": program.times,
         "legs_mm": to_millimetres(program.legs),
+        **({} if program.laser_power is None else {POWER: program.laser_power}),
     }
     return {_FILE: packed_arrays(arrays)}
 
 
 def _read(folder: Path) -> Program:
     file = folder / _FILE
-    arrays = read_arrays(file, ("header", "legs_mm"), ProgramError)
-    return of_archive(arrays["header"], arrays["legs_mm"], file)
+    arrays = read_arrays(file, ("header", "legs_mm"), ProgramError, optional=(POWER,))
+    return of_archive(arrays["header"], arrays["legs_mm"], arrays.get(POWER), file)
 
 
 NPZ = register(Post("npz", "NumPy archive", _write, _read))

@@ -20,6 +20,9 @@ from pentapod.program.program import Program
 from pentapod.program.resolution import quantised
 from pentapod.toolpath.toolpath import Toolpath
 
+LASER_POWER = "laser power"
+"""Among what a post loses: the laser's power at each row. Spindle, coolant and tool are in its header all the same."""
+
 GROUP = "pentapod.posts"
 """Entry points of this group name a `Post`, or a function without arguments that returns one."""
 
@@ -122,6 +125,8 @@ def write_post(
             raise InputError("there is no verdict on this program", key="verdict", remedy=remedy)
         check_passed(verdict, given.sha256 or sha256(csv_bytes(given.program)).hexdigest())
     program = given.program if post.takes_toolpath or post.readings else commanded(given.program, given.machine)
+    if LASER_POWER in post.loses:
+        program = replace(program, laser_power=None)
     source = replace(program.provenance, unverified=unverified)
     contents = post.write(replace(given, program=replace(program, provenance=source)))
     if unverified:

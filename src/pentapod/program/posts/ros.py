@@ -18,7 +18,7 @@ from pentapod.base.arrays import Floats
 from pentapod.base.errors import ProgramError
 from pentapod.program.header import UNVERIFIED, Header, header_text
 from pentapod.program.posts.motion import accelerations, velocities
-from pentapod.program.posts.registry import Post, PostInput, register
+from pentapod.program.posts.registry import LASER_POWER, Post, PostInput, register
 from pentapod.program.posts.rows import check_legs, check_rows, header_of, read_file
 from pentapod.program.posts.tables import SIDECAR
 from pentapod.program.program import Program
@@ -120,9 +120,10 @@ def _program(message: Any, header: Header, file: Path) -> Program:
     return header.program(check_legs(legs, file))
 
 
-JSON = register(
-    Post("ros2-json", "ROS 2 JointTrajectory as JSON", partial(_write, style="json"), partial(_read, style="json"))
-)
-YAML = register(
-    Post("ros2-yaml", "ROS 2 JointTrajectory as YAML", partial(_write, style="yaml"), partial(_read, style="yaml"))
-)
+def _post(style: Style) -> Post:
+    write, read = partial(_write, style=style), partial(_read, style=style)
+    about = f"ROS 2 JointTrajectory as {style.upper()}"
+    return register(Post(f"ros2-{style}", about, write, read, frozenset({LASER_POWER})))
+
+
+JSON, YAML = _post("json"), _post("yaml")

@@ -12,6 +12,7 @@ from pentapod.base.archives import check_array
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ProgramError
 from pentapod.base.files import read_bytes
+from pentapod.program.csv_rows import POWER
 from pentapod.program.header import Header, parse_header
 from pentapod.program.program import Program
 from pentapod.program.resolution import LARGEST_M, quantised
@@ -46,10 +47,22 @@ def check_legs(legs: Floats, file: Path) -> Floats:
     return quantised(legs)
 
 
-def of_archive(header: NDArray[Any], legs_mm: NDArray[Any], file: Path) -> Program:
-    """Return the program of an archive: its header's text and its legs (N, n), millimetres. Raises ProgramError."""
+def check_power(power: Floats | None, header: Header, file: Path) -> Floats | None:
+    """Return the laser's power (N,), or None for none. Raises ProgramError where the header says otherwise."""
+    if (power is None) == header.powered:
+        what = "the laser's power is missing" if header.powered else "the header has no laser power"
+        raise ProgramError(what, file=file, key=POWER, remedy="write the post again")
+    if power is not None and not ((power >= 0.0) & (power <= 1.0)).all():
+        raise ProgramError("not a share of the laser's full power", file=file, key=POWER, expected="0 to 1")
+    return power
+
+
+def of_archive(header: NDArray[Any], legs_mm: NDArray[Any], power: NDArray[Any] | None, file: Path) -> Program:
+    """Return the program of an archive: header's text, legs (N, n) in mm, the laser's power. Raises ProgramError."""
     check_array(header, "header", file, ProgramError, "U", ())
     found = header_of(str(header).splitlines(), file)
     check_array(legs_mm, "legs_mm", file, ProgramError, "fi", (None, found.legs))
     check_rows(len(legs_mm), found, file)
-    return found.program(check_legs(legs_mm / 1e3, file))
+    if power is not None:
+        check_array(power, POWER, file, ProgramError, "fi", (len(legs_mm),))
+    return found.program(check_legs(legs_mm / 1e3, file), check_power(power, found, file))

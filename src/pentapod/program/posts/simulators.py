@@ -14,7 +14,7 @@ from typing import cast
 from pentapod.base.errors import ProgramError
 from pentapod.machine.rigid_bodies.mjcf import mjcf
 from pentapod.machine.rigid_bodies.sdf import sdf
-from pentapod.program.posts.registry import Post, PostInput, register
+from pentapod.program.posts.registry import LASER_POWER, Post, PostInput, register
 from pentapod.program.posts.ros import trajectory_yaml
 from pentapod.program.posts.rows import read_file
 from pentapod.program.posts.tables import LEGS, Column, Files, Table, leg_columns, table_post
@@ -50,7 +50,8 @@ def _read(folder: Path, form: str) -> Program:
 
 
 def _post(form: str, about: str) -> Post:
-    return register(Post(form, about, partial(_write, form=form), partial(_read, form=form), readings=True))
+    write, read = partial(_write, form=form), partial(_read, form=form)
+    return register(Post(form, about, write, read, frozenset({LASER_POWER}), readings=True))
 
 
 MJCF = _post("mjcf", "MuJoCo: the machine as MJCF, and its legs at every row")

@@ -24,20 +24,21 @@ from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError, ProgramError
 from pentapod.base.values import Value
 from pentapod.kinematics.five_legs import FiveLegs
-from pentapod.program.csv_rows import numbers_in
+from pentapod.program.csv_rows import POWER, POWER_DECIMALS, numbers_in
 from pentapod.program.header import Header, header_text
 from pentapod.program.posts.motion import velocities
 from pentapod.program.posts.registry import Post, PostInput
-from pentapod.program.posts.rows import check_legs, check_rows, header_of, read_file
+from pentapod.program.posts.rows import check_legs, check_power, check_rows, header_of, read_file
 from pentapod.program.program import Program
 from pentapod.program.resolution import QUANTA_PER_M
 
-Kind = Literal["time", "length", "velocity"]
+Kind = Literal["time", "length", "velocity", "power"]
 
 UNITS: dict[Kind, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e3, "us": 1e6},
     "length": {"m": 1.0, "mm": 1e3, "um": 1e6, "inch": 1.0 / 0.0254},
     "velocity": {"m/s": 1.0, "mm/s": 1e3, "mm/min": 6e4, "um/s": 1e6},
+    "power": {"": 1.0},
 }
 """Units by kind, and how many make one SI unit."""
 
@@ -52,7 +53,8 @@ SIDECAR = "program.header"
 class Column(Value):
     """A column: title, kind, unit, decimals; leg, from 1 on, for lengths and velocities.
 
-    Raises InputError for an unknown kind or unit, and where the leg is missing, or given for a time.
+    A power is the laser's share of full power; its unit is "". Raises InputError for an unknown kind or unit, and where
+    the leg is missing, or given for a time or a power.
     """
 
     title: str
@@ -66,8 +68,10 @@ class Column(Value):
             raise InputError("unknown kind", key=self.title, value=self.kind, expected=", ".join(UNITS))
         if self.unit not in UNITS[self.kind]:
             raise InputError("unknown unit", key=self.title, value=self.unit, expected=", ".join(UNITS[self.kind]))
-        if (self.leg is None) != (self.kind == "time") or (self.leg is not None and self.leg < 1):
-            raise InputError("wrong leg", key=self.title, value=self.leg, expected="1, 2, ...; none for a time")
+        if (self.leg is None) != (self.kind in ("time", "power")) or (self.leg is not None and self.leg < 1):
+            raise InputError(
+                "wrong leg", key=self.title, value=self.leg, expected="1, 2, ...; none for a time or a power"
+            )
 
     @property
     def factor(self) -> float:
@@ -82,6 +86,8 @@ class Column(Value):
 
     def values(self, program: Program) -> Floats:
         """Return the column (N,), in its unit."""
+        if self.kind == "power":
+            return np.zeros(len(program.legs)) if program.laser_power is None else program.laser_power
         if self.leg is None:
             return program.times * self.factor
         if self.kind == "velocity":
@@ -89,6 +95,10 @@ class Column(Value):
         # From counts of the resolution, so that the digits are those of the program.
         return np.rint(program.legs[:, self.leg - 1] * QUANTA_PER_M) / (QUANTA_PER_M / self.factor)
 
+
+POWER_COLUMN = Column(POWER, "power", "", POWER_DECIMALS)
+POWER_FILE = "laser_power.txt"
+"""The column of the laser's power, and its file where each leg has one."""
 
 Files: TypeAlias = Mapping[str, tuple[Column, ...]]
 """Columns by file name."""
@@ -110,6 +120,19 @@ class Table(Value):
 
     def __post_init__(self) -> None:
         self.files_for(LEGS)
+
+    def all_files(self, legs: int, *, powered: bool) -> Files:
+        """Return `files_for`, with the laser's power as the last column of the first file, where there is a power.
+
+        Files with one leg each have it in a file of its own.
+        """
+        files = self.files_for(legs)
+        first = next(iter(files.values()))
+        if not powered:
+            return files
+        if len(files) == 1:
+            return {name: (*columns, POWER_COLUMN) for name, columns in files.items()}
+        return {**files, POWER_FILE: (*(c for c in first if c.kind == "time"), POWER_COLUMN)}
 
     def files_for(self, legs: int) -> Files:
         """Return the columns by file name for so many legs. Raises InputError where they are of others."""
@@ -138,9 +161,9 @@ def table_post(name: str, about: str, table: Table) -> Post:
 
 
 def _write(given: PostInput, table: Table) -> dict[str, bytes]:
-    header, mark = header_text(given.program), table.comment
+    header, mark, power = header_text(given.program), table.comment, given.program.laser_power
     files = {SIDECAR: header.encode()} if mark is None else {}
-    for name, columns in table.files_for(given.program.legs.shape[1]).items():
+    for name, columns in table.all_files(given.program.legs.shape[1], powered=power is not None).items():
         text = "" if mark is None else "".join(f"{mark}{line.removeprefix('#')}\n" for line in header.splitlines())
         if table.titles:
             text += table.separator.join(column.title for column in columns) + "\n"
@@ -154,24 +177,27 @@ def _write(given: PostInput, table: Table) -> dict[str, bytes]:
 def _read(folder: Path, table: Table) -> Program:
     first = folder / next(iter(table.files_for(LEGS)))
     header, above = _header(folder, {first: _lines(first)}, table)
-    files = table.files_for(header.legs)
+    files = table.all_files(header.legs, powered=header.powered)
     texts = {folder / name: _lines(folder / name) for name in files}
     if len(texts) > 1:
         _header(folder, texts, table)
     legs: dict[int, Floats] = {}
-    rates: list[tuple[Path, Column, Floats]] = []
+    rates, power = list[tuple[Path, Column, Floats]](), None
     for (file, lines), columns in zip(texts.items(), files.values(), strict=True):
         numbers = _numbers(lines[above:], columns, table, file, above + 1)
         check_rows(len(numbers), header, file)
         for column, values in zip(columns, numbers.T, strict=True):
-            if column.leg is None:
+            if column.kind == "power":
+                power = values
+            elif column.leg is None:
                 expected = header.period * column.factor * np.arange(len(values), dtype=np.float64)
                 _check_close(values, expected, column, file, "the time is not a multiple of the period")
             elif column.kind == "length":
                 legs[column.leg] = values / column.factor
             else:
                 rates.append((file, column, values))
-    program = header.program(check_legs(np.column_stack([legs[leg + 1] for leg in range(header.legs)]), folder))
+    rows = check_legs(np.column_stack([legs[leg + 1] for leg in range(header.legs)]), folder)
+    program = header.program(rows, check_power(power, header, folder))
     for file, column, values in rates:
         _check_close(values, column.values(program), column, file, "not the velocity of the spline through the rows")
     return program

@@ -31,7 +31,7 @@ _BY_BEGINNING = (
             "dwells",
         ),
     ),
-    (5, ("readable", "machine", "controller", "job", "placement", "component as asked")),
+    (5, ("readable", "machine", "controller", "job", "placement", "component as asked", "process data")),
 )  # fmt: skip
 """Kind of a claim by how its name begins; the first that fits."""
 

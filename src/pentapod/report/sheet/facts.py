@@ -18,6 +18,7 @@ from pentapod.report import words
 from pentapod.report.drawings.planned_run import PlannedRun
 from pentapod.report.drawings.touch_off import TouchOff
 from pentapod.report.drawings.views import words_of
+from pentapod.toolpath.process import Process
 from pentapod.toolpath.toolpath import SegmentKind
 
 Fact = tuple[str, str]
@@ -61,6 +62,10 @@ def tool_facts(run: PlannedRun) -> list[Fact]:
         if tool.stem is not None:
             wide = 2.0 * max(solid.largest_radius for solid in tool.solids)
             facts.append(("stem", f"not given: ⌀ {_mm(wide)} assumed up to the spindle"))
+    if program is not None and program.switches:
+        facts += [("process", str(Process().after(program.switches[0].words)) or "see the program's switches")]
+    if program is not None and program.laser_power is not None:
+        facts.append(("laser", f"up to {100.0 * float(program.laser_power.max()):.3g} % of full power"))
     if program is not None and program.rail_positions is not None:
         facts.append(("guides", ", ".join(words_of(1e3 * x, 3) for x in program.rail_positions)))
     return facts

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from pentapod.base.arrays import Floats
+from pentapod.geometry.polyline import arc_length
+from pentapod.toolpath.process import laser_power
+from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
 from pentapod.verify.verdict.verdict import Place
@@ -75,10 +79,56 @@ def controller(replay: Replay) -> Finding:
     return Finding.without_value(passed, method)
 
 
+def process(replay: Replay) -> Finding | Idle:
+    """Judge that spindle, coolant, tool and laser are switched as the toolpath says, and where; idle where none is.
+
+    A switch may be as far from its waypoint as the path may be from the toolpath, and as far as the tool moves in a
+    period.
+    """
+    program, toolpath = replay.program, replay.toolpath
+    said = [*(segment.words for segment in toolpath.segments), toolpath.end_words]
+    if not any(said) and not program.switches and program.laser_power is None:
+        return Idle("neither the toolpath nor the program says anything of spindle, coolant, tool and laser")
+    arcs, travelled = arc_length(toolpath.tilt_centres)[toolpath.starts], replay.match.arcs[::2]
+    room = 2.0 * replay.match_radius + np.abs(np.diff(travelled, prepend=travelled[0])).max()
+    wanted = [(at, word) for at, words in enumerate(said) for word in words if laser_power(word) is None]
+    found = [(switch.row, word) for switch in program.switches for word in switch.words]
+    if [" ".join(word.split()) for _, word in wanted] != [word for _, word in found]:
+        return Finding.without_value(False, "the words of the header's switches are not those of the toolpath")
+    off = [abs(float(travelled[row] - arcs[at])) for (at, _), (row, _) in zip(wanted, found, strict=True)]
+    rows = [row for row, _ in found]
+    shares, power = _powers(toolpath, said), program.laser_power
+    if (power is None) != (shares is None):
+        return Finding.without_value(False, "the laser's power is not that of the toolpath: on one side there is none")
+    if power is not None and shares is not None:
+        first, last = (np.clip(np.searchsorted(arcs, travelled + d), 1, len(shares)) - 1 for d in (-room, room))
+        near, wrong = first, np.abs(power - shares[first]) > 1e-6
+        while (near < last).any():
+            near = np.minimum(near + 1, last)
+            wrong &= np.abs(power - shares[near]) > 1e-6
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            return Finding.without_value(False, "the laser's power is not that of the toolpath", replay.place(2 * row))
+    worst = int(np.argmax(off)) if off else None
+    where = Place() if worst is None else replay.place(2 * rows[worst])
+    method = f"{len(found)} words in order, each at its waypoint; the laser is off where nothing is cut"
+    return Finding.at_most(0.0 if worst is None else off[worst], float(room), MM, "mm", where, method)
+
+
+def _powers(toolpath: Toolpath, said: list[tuple[str, ...]]) -> Floats | None:
+    """Return the laser's power (S,) on each segment; None where no word sets it."""
+    share, shares = None, list[float]()
+    for segment, words in zip(toolpath.segments, said, strict=False):
+        share = next((power for word in reversed(words) if (power := laser_power(word)) is not None), share)
+        shares.append((share or 0.0) if segment.kind is SegmentKind.CUT else 0.0)
+    return None if share is None else np.array(shares)
+
+
 CLAIMS = (
     Claim("machine", machine, needs_pose=False),
     Claim(GUIDES, guides, needs_pose=False),
     Claim("controller", controller, needs_pose=False),
     Claim("job", job, needs_pose=False),
     Claim("component as asked", component, needs_pose=False),
+    Claim("process data", process),
 )

@@ -25,6 +25,8 @@ def _write(given: PostInput) -> dict[str, bytes]:
             note = kinematics.nearer_than_least(given.the_machine(), program.component, given.toolpath)
     except MachineError as error:
         note = f"It is not here: {error}.\n"
+    tools = {"tool.tbl": trivkins.tool_table(program)}
+    folders = {folder: {**files, **tools} if "tool.tbl" in files else files for folder, files in folders.items()}
     files = {f"{folder}/{name}": content for folder, files in folders.items() for name, content in files.items()}
     machine = given.the_machine()
     words = {

@@ -13,15 +13,17 @@ ROUNDING = 1e-9
 
 def stream_files(given: PostInput) -> dict[str, bytes]:
     """Return the setpoints, and HAL and script that play them. Raises InputError."""
-    hal = _hal(given.the_machine(), servo_period_ns(given.program.period))
+    powered = given.program.laser_power is not None
+    hal = _hal(given.the_machine(), servo_period_ns(given.program.period), powered=powered)
     return {**HALSTREAMER.write(given), "stream.hal": hal.encode(), "play.sh": packaged("play_stream.sh")}
 
 
-def _hal(machine: Machine, period_ns: int) -> str:
+def _hal(machine: Machine, period_ns: int, *, powered: bool) -> str:
+    """Return the HAL. powered: whether the rows end with the laser's power, for the signal laser-power."""
     count = machine.robot.n_legs
     lines = [
         f"loadrt threads name1=servo-thread period1={period_ns}",
-        f"loadrt streamer depth=16000 cfg={'f' * count}",
+        f"loadrt streamer depth=16000 cfg={'f' * (count + powered)}",
         f"loadrt limit3 names={','.join(f'leg{k + 1}' for k in range(count))}",
         f"loadrt sampler depth=16000 cfg={'f' * 2 * count}",
         "setp streamer.0.enable 0",
@@ -41,4 +43,6 @@ def _hal(machine: Machine, period_ns: int) -> str:
             f"setp {leg}.maxv {number(1e3 * limits.max_velocity[k] * (1.0 + ROUNDING))}",
             f"setp {leg}.maxa {number(1e3 * limits.max_acceleration[k] * (1.0 + ROUNDING))}",
         ]
+    if powered:
+        lines.append(f"net laser-power streamer.0.pin.{count}")
     return "\n".join(lines) + "\n"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,6 +32,7 @@ from pentapod.program.posts.registry import PostInput
 from pentapod.program.posts.rows import read_file
 from pentapod.program.program import Program
 from pentapod.program.resolution import quantised
+from pentapod.toolpath.process import laser_word, plain_word
 
 LETTERS = "XYZUVW"
 """Linear axes of LinuxCNC, in the order of the legs."""
@@ -84,7 +86,35 @@ def trivkins_files(given: PostInput) -> dict[str, bytes]:
         },
         servo_period_ns(program.period),
     )
-    return files_of(ini, hal_text(len(letters)), FILE, gcode(legs, dt), len(letters))
+    said = words_at(program, times)
+    return files_of(ini, hal_text(len(letters)), FILE, gcode(legs, dt, said), len(letters))
+
+
+def words_at(program: Program, times: Floats) -> dict[int, list[str]]:
+    """Return the words before the moves to points at these times (M,), by their index; M: after the last move.
+
+    A switch comes before the move during which it happens. The laser's power is that at a move's beginning.
+    """
+    ends = times / program.period
+    last = len(program.legs) - 1
+    said: dict[int, list[str]] = {}
+    for switch in program.switches:
+        at = len(times) if switch.row == last else int(np.searchsorted(ends, switch.row, side="right"))
+        said.setdefault(at if switch.row else 0, []).extend(switch.words)
+    if program.laser_power is not None:
+        powers = program.laser_power[np.minimum(np.rint(ends[:-1]).astype(np.intp), last)]
+        changed = np.flatnonzero(np.diff(powers, prepend=-1.0))
+        for k in changed.tolist():
+            said.setdefault(k + 1, []).append(laser_word(float(powers[k])))
+        said.setdefault(len(times), []).append(laser_word(0.0))
+    return said
+
+
+def tool_table(program: Program) -> bytes:
+    """Return LinuxCNC's tool table, with the tools that the program calls."""
+    named = [plain_word(word)[1:] for switch in program.switches for word in switch.words if word[:1] == "T"]
+    numbers = sorted({1, *(int(number) for number in named if number.isdecimal())})
+    return "".join(f"T{number} P{place} Z0 D0 ;\n" for place, number in enumerate(numbers, start=1)).encode()
 
 
 def letters_of(program: Program) -> str:
@@ -110,13 +140,18 @@ def knots(program: Program) -> Floats:
     return np.linspace(0.0, program.duration, count + 1)
 
 
-def gcode(legs_mm: Floats, dt: float) -> bytes:
-    """Return G-code through leg lengths (M, n_legs) in mm, dt seconds apart, from the current lengths."""
+def gcode(legs_mm: Floats, dt: float, said: Mapping[int, Sequence[str]] | None = None) -> bytes:
+    """Return G-code through leg lengths (M, n_legs) in mm, dt seconds apart, from the current lengths.
+
+    said: words before the moves, of `words_at`.
+    """
     words = " ".join(f"{letter}%.8f" for letter in LETTERS[: legs_mm.shape[1]])
     lines = ["G21 G90 G40 G49", "G64", "G93"]
     block = f"G1 {words} F{60.0 / dt:.9f}"
-    lines += [block % tuple(row) for row in legs_mm.tolist()]
-    return ("\n".join([*lines, "G94", "M2"]) + "\n").encode()
+    words_before = said or {}
+    for k, row in enumerate(legs_mm.tolist()):
+        lines += [*words_before.get(k, ()), block % tuple(row)]
+    return ("\n".join([*lines, *words_before.get(len(legs_mm), ()), "G94", "M2"]) + "\n").encode()
 
 
 def read_gcode(file: Path) -> tuple[Floats, Floats]:

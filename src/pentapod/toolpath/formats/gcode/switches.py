@@ -14,6 +14,8 @@ from pentapod.toolpath.formats.gcode.tracer import Tracer
 _CHANGE, _SET_TOOL = 6.0, 61.0
 _TCP_ON, _TCP_OFF = 428.0, 429.0
 _SUBPROGRAM_ENDS = 17.0
+_OUTPUTS = frozenset({67.0, 68.0})
+"""Analog outputs of LinuxCNC, E, set to a value, Q."""
 
 
 @dataclass
@@ -31,8 +33,8 @@ class Switches:
     seen: list[str] = field(default_factory=list[str])
     ended: int | None = None
 
-    def take(self, switches: Sequence[Word], words: Mapping[str, Word], line: int) -> None:
-        """Take the M and T words of a block; spindle, coolant and tool are kept as words."""
+    def take(self, switches: Sequence[Word], words: dict[str, Word], line: int) -> None:
+        """Take the M and T words of a block, and those that belong to them; what they switch is kept as words."""
         tracer = self.tracer
         if "T" in words:
             word = words["T"]
@@ -54,6 +56,8 @@ class Switches:
             elif code in STOP_M:
                 tracer.moves.add_words(str(word))
                 tracer.tell("stop", line)
+            elif code in _OUTPUTS and "E" in words and "Q" in words:
+                tracer.moves.add_words(" ".join(str(each) for each in (word, words.pop("E"), words.pop("Q"))))
             elif code not in IDLE_M:
                 tracer.moves.add_words(str(word))
                 if code not in SPINDLE_M and code not in COOLANT_M:
