@@ -163,6 +163,8 @@ class Job(Value):
         content = self.tables.model_dump(mode="json", exclude={"verify"})
         if not self.limits.use:
             del content["limits"]
+        if self.placement.table_turn_deg is None:
+            del content["placement"]["table_turn_deg"]
         if not self.part.flip:
             del content["part"]["flip"]
         content["part"]["mesh"] = [self.mesh_path.suffix.lower(), _sha(self.mesh_path)]
