@@ -47,6 +47,21 @@ def test_what_is_not_toml_is_told_with_its_line(text: str, line: int) -> None:
     assert caught.value.line == line
 
 
+@pytest.mark.parametrize(
+    ("text", "remedy"),
+    [
+        ("a = 10,5", "decimal point"),
+        ("a_mm = 6.0 mm  # wide", "alone: its unit is in the name"),
+        ("a_mm_min = 1500mm/min", "alone: its unit is in the name"),
+        ("a = [1, 2", None),
+    ],
+)
+def test_a_decimal_comma_or_a_unit_behind_a_number_has_its_remedy(text: str, remedy: str | None) -> None:
+    with pytest.raises(JobError, match=remedy or "not TOML") as caught:
+        parsed(f"b = 1\n{text}\n", "job.toml", JobError)
+    assert (caught.value.remedy is None) == (remedy is None)
+
+
 def test_what_cannot_be_read_says_what_was_expected(tmp_path: Path) -> None:
     for path, words in (
         (tmp_path, "this is a folder; expected a job file"),

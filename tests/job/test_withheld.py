@@ -30,7 +30,7 @@ def test_the_refusal_names_claims_that_fail_with_value_bound_and_time():
     names = ("gouge", "tip deviation", "leg 1 speed", "leg 2 speed", "leg 3 speed")
     refusal = withheld(Verdict(tuple(certificate(name, name == "leg 3 speed") for name in names)))
     assert refusal is not None
-    assert "gouge 0.5 mm (bound 0.1) at 1.250 s; tip deviation" in str(refusal)
+    assert "gouge 0.5 mm (at most 0.1) at 1.250 s; tip deviation" in str(refusal)
     assert "and 1 more claim" in str(refusal)
     assert "leg 3" not in str(refusal)
 

@@ -22,11 +22,11 @@ def within(progress: Progress, stage: str, begin: float, end: float) -> Progress
 
     A step that is done again does not go back.
     """
-    furthest = begin
+    outer, furthest = stage, begin
 
-    def shown(step: str, fraction: float, note: str = "") -> None:
+    def shown(stage: str, fraction: float, note: str = "") -> None:
         nonlocal furthest
         furthest = max(furthest, begin + (end - begin) * fraction)
-        progress(stage, furthest, note or step)
+        progress(outer, furthest, note or stage)
 
     return shown

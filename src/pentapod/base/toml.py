@@ -57,13 +57,23 @@ def parsed(text: str, file: str | Path, wrong: type[InputError]) -> dict[str, An
         place = ERROR_PLACE.search(str(error))
         # An error at the end of the file has no place.
         line, column = (int(place[1]), int(place[2])) if place else (len(text.splitlines()), None)
-        raise wrong(f"not TOML: {str(error).split(' (at ')[0]}", file=file, line=line, column=column) from error
+        told, remedy = str(error).split(" (at ")[0], _spelling(text.splitlines()[line - 1] if line else "")
+        raise wrong(f"not TOML: {told}", file=file, line=line, column=column, remedy=remedy) from error
     except RecursionError as error:
         raise wrong("nested too deep", file=file, line=_deepest_line(text), expected=_SHALLOW) from error
     except (ValueError, ArithmeticError) as error:
         raise wrong("a number of too many digits", file=file, line=_digits_line(text), expected=_FEW_DIGITS) from error
     _check_values(content, text, file, wrong)
     return content
+
+
+def _spelling(line: str) -> str | None:
+    """Return how to write a number of a line that has a decimal comma, or a unit behind it."""
+    if re.search(r"=\s*[-+]?\d+,\d+\s*(#.*)?$", line):
+        return "write a number with a decimal point"
+    if re.search(r"=\s*[-+]?\d+(\.\d+)?\s*[a-zµ°%][\w/]*\s*(#.*)?$", line):
+        return "write the number alone: its unit is in the name of the key"
+    return None
 
 
 def _check_values(content: dict[str, Any], text: str, file: str | Path, wrong: type[InputError]) -> None:

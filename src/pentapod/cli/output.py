@@ -77,7 +77,7 @@ def _claim(certificate: Certificate) -> str:
         text += f": {certificate.value:.6g} {certificate.unit}".rstrip()
     if certificate.bound is not None:
         allowed = f", {certificate.allowed:.6g} allowed" if certificate.is_lenient else ""
-        text += f" (bound {certificate.bound:.6g}{allowed})"
+        text += f" ({certificate.sense} {certificate.bound:.6g}{allowed})"
     if not certificate.passed and certificate.where.time_s is not None:
         text += f" at {certificate.where.time_s:.3f} s"
     if not certificate.passed and certificate.value is None:

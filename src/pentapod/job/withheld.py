@@ -69,5 +69,5 @@ def _said(certificate: Certificate) -> str:
     if certificate.value is not None:
         text += f" {certificate.value:.4g} {certificate.unit}".rstrip()
     if certificate.bound is not None:
-        text += f" (bound {certificate.bound:.4g})"
+        text += f" ({certificate.sense} {certificate.bound:.4g})"
     return text + ("" if certificate.where.time_s is None else f" at {certificate.where.time_s:.3f} s")

@@ -54,6 +54,16 @@ def test_placement_on_a_table_rests_on_the_lowest_point(up, make_job):
         assert abs(origin[0]) <= 0.05
 
 
+def test_the_digest_of_a_job_counts_the_turn_on_the_table(make_job):
+    """And a job that does not give it keeps its digest."""
+    table = 'mode = "table"\ntable_z_mm = 640\n'
+    free, turned = load(make_job, table), load(make_job, f"{table}table_turn_deg = [0, 0]\n")
+    constraints = constraints_of(turned)
+    assert (constraints.largest_turn, constraints.motion.shape) == (0.0, (6, 2))
+    np.testing.assert_allclose(constraints.reference, np.diag([1.0, -1.0, -1.0]), atol=1e-15)
+    assert free.digest == load(make_job, table).digest != turned.digest
+
+
 def test_fixture_poses_are_the_placements_to_choose_from(make_job):
     constraints = constraints_of(
         load(make_job, 'mode = "fixture"\nposes_mm_deg = [[1, 2, 3, 0, 0, 0], [4, 5, 6, 0, 0, 90]]\n')
@@ -67,6 +77,8 @@ def test_fixture_poses_are_the_placements_to_choose_from(make_job):
 MISTAKES = {
     'mode = "table"': ("placement.table_z_mm", "missing"),
     'mode = "table"\ntable_z_mm = 600\ntable_x_mm = [5, 4]': ("placement.table_x_mm", "empty"),
+    'mode = "table"\ntable_z_mm = 600\ntable_turn_deg = [90, 0]': ("placement.table_turn_deg", "empty"),
+    'mode = "free"\ntable_turn_deg = [0, 0]': ("placement.table_turn_deg", "means nothing"),
     'mode = "table"\ntable_z_mm = 600\nup = [0, 0, 0]': ("placement.up", "zero"),
     'mode = "table"\ntable_z_mm = 600\nbox_mm = [[0, 0, 0], [1, 1, 1]]': ("placement.box_mm", "means nothing"),
     'mode = "fixture"': ("placement.poses_mm_deg", "missing"),

@@ -34,6 +34,8 @@ def freedoms(seed: int) -> list[PlacementConstraints]:
         PlacementConstraints.free(reference=reference, largest_turn=float(rng.uniform(0.01, 3.0))),
         PlacementConstraints.table(0.6, x=(-0.1, 0.2), y=(0.0, 0.1), up=rng.normal(size=3)),
         PlacementConstraints.table(-0.6, up=(0.0, 1.0, 0.0), normal=(0.0, 0.0, 1.0)),
+        PlacementConstraints.table(0.6, up=rng.normal(size=3), turn=(-0.3, float(rng.uniform(-0.29, 2.0)))),
+        PlacementConstraints.table(0.6, x=(-0.1, 0.2), up=rng.normal(size=3), turn=(1.0, 1.0)),
     ]
 
 
@@ -97,6 +99,20 @@ def test_a_half_turn_is_measured_and_undone():
     table = PlacementConstraints.table(0.5, up=(0.0, 0.0, 1.0))
     r, _ = table.nearest(np.eye(3)[None], np.zeros((1, 3)))
     np.testing.assert_allclose(r[0] @ [0.0, 0.0, 1.0], [0.0, 0.0, -1.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("up", "axis"), [((0.0, 0.0, 1.0), 0), ((0.2, -0.9, 0.1), 0), ((1.0, 0.1, 0.0), 1)])
+@pytest.mark.parametrize("normal", [(0.0, 0.0, -1.0), (0.0, 0.0, 1.0)])
+def test_the_axis_of_a_part_points_where_the_table_allows(up, axis, normal):
+    """Its x axis in plan, its y axis where x stands upright; whatever it was turned by before."""
+    table = PlacementConstraints.table(0.5, up=up, normal=normal, turn=(np.radians(80.0), np.radians(100.0)))
+    turned, _ = table.nearest(Rotation.random(50, rng=1).as_matrix(), np.zeros((50, 3)))
+    points = np.degrees(np.arctan2(turned[:, 1, axis], turned[:, 0, axis]))
+    assert 80.0 - 1e-6 <= points.min() <= points.max() <= 100.0 + 1e-6
+    assert np.ptp(points) > 15.0
+    kept = PlacementConstraints.table(0.5, up=up, normal=normal, turn=(-0.5, -0.5))
+    turned, _ = kept.nearest(Rotation.random(5, rng=1).as_matrix(), np.zeros((5, 3)))
+    np.testing.assert_allclose(np.arctan2(turned[:, 1, axis], turned[:, 0, axis]), -0.5, atol=1e-9)
 
 
 def test_a_part_on_a_table_of_any_height_keeps_its_upper_side() -> None:

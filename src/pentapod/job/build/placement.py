@@ -92,7 +92,8 @@ def _on_table(job: Job, machine: Machine, mesh: Mesh) -> PlacementConstraints:
     lowest = float((mesh.vertices @ up).min())
     height = table.si.table_z - side * lowest
     x, y = (_EVERYWHERE if ends is None else tuple(ends.tolist()) for ends in (table.si.table_x, table.si.table_y))
-    return PlacementConstraints.table(height, x=x, y=y, up=up, normal=(0.0, 0.0, side))
+    turn = (-np.pi, np.pi) if table.table_turn_deg is None else tuple(table.si.table_turn.tolist())
+    return PlacementConstraints.table(height, x=x, y=y, up=up, normal=(0.0, 0.0, side), turn=turn)
 
 
 def fixed_placement(table: TomlTable, wrong: Callable[..., InputError]) -> RigidTransform:

@@ -168,6 +168,8 @@ class Job(Value):
             del content["feed"]["cutting_force_n"]
         if all(value is None for value in content["process"].values()):
             del content["process"]
+        if self.placement.table_turn_deg is None:
+            del content["placement"]["table_turn_deg"]
         if not self.part.flip:
             del content["part"]["flip"]
         content["part"]["mesh"] = [self.mesh_path.suffix.lower(), _sha(self.mesh_path)]

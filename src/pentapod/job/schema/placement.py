@@ -17,7 +17,7 @@ Mode = Literal["free", "table", "fixture", "fixed"]
 PLACEMENT_KEYS: dict[str, tuple[str, ...]] = {
     "fixed": ("position_mm", "rotation_deg", "matrix"),
     "free": ("box_mm", "rotation_deg", "largest_turn_deg"),
-    "table": ("table_z_mm", "table_x_mm", "table_y_mm", "up"),
+    "table": ("table_z_mm", "table_x_mm", "table_y_mm", "table_turn_deg", "up"),
     "fixture": ("poses_mm_deg",),
 }
 """The keys that each mode takes."""
@@ -61,6 +61,14 @@ class PlacementKeys:
     ] = None
     table_x: Annotated[Range | None, Key("mm", "table: least and greatest x of the mesh's origin")] = None
     table_y: Annotated[Range | None, Key("mm", "table: least and greatest y of the mesh's origin")] = None
+    table_turn: Annotated[
+        Range | None,
+        Key(
+            "deg",
+            "table: least and greatest direction of the mesh's x axis in plan, of its y axis where x stands upright: "
+            "0 is the machine's x, 90 its y; [0, 0] keeps it along x",
+        ),
+    ] = None
     up: Annotated[VECTOR, Key("", "table: which direction is up (to the base), mesh frame")] = (0.0, 0.0, 1.0)
     poses: Annotated[
         tuple[Pose, ...] | None,
@@ -112,7 +120,7 @@ class PlacementKeys:
             wrong("setups", "one fixed placement is one set-up", "another mode, or no setups")
         if mode == "fixture" and table.poses_mm_deg is None:
             wrong("poses_mm_deg", "the fixture's poses are missing", "[[x, y, z, turn x, turn y, turn z], ...]")
-        for key in ("table_x_mm", "table_y_mm"):
+        for key in ("table_x_mm", "table_y_mm", "table_turn_deg"):
             ends = getattr(table, key)
             if ends is not None and ends[0] > ends[1]:
                 wrong(key, "the range is empty", "[least, greatest]")

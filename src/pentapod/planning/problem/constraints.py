@@ -82,12 +82,14 @@ class PlacementConstraints(Value):
         y: tuple[float, float] = (-np.inf, np.inf),
         up: ArrayLike = (0.0, 0.0, 1.0),
         normal: ArrayLike = (0.0, 0.0, -1.0),
+        turn: tuple[float, float] = (-np.pi, np.pi),
     ) -> PlacementConstraints:
         """Return the constraints of a part that stands on a table parallel to the base plane.
 
         height: z of the workpiece's origin, machine frame. x, y: least and greatest coordinate of the origin, metres.
         up (3,): direction of the workpiece that is up on the table. normal (3,): up for the table, ±z of the machine.
-        The part may be shifted along the table and turned about its normal.
+        turn: least and greatest direction of the workpiece's x axis in plan, of its y axis where x stands upright,
+        radians from the machine's x towards its y. The part may be shifted along the table and turned about its normal.
         """
         upright, upward = as_floats(up, "up", (3,)), as_floats(normal, "normal", (3,))
         upright, upward = upright / np.linalg.norm(upright), upward / np.linalg.norm(upward)
@@ -97,7 +99,9 @@ class PlacementConstraints(Value):
         motion[0, 0] = motion[1, 1] = 1.0
         motion[3:, 2] = upright
         low, high = np.array([x[0], y[0], height]), np.array([x[1], y[1], height])
-        return cls(motion, low, high, np.eye(3), np.pi, upright, upward)
+        largest = min(0.5 * (turn[1] - turn[0]), np.pi)
+        reference = np.eye(3) if largest == np.pi else _standing(upright, upward, 0.5 * (turn[0] + turn[1]))
+        return cls(motion[:, : 3 if largest > 0.0 else 2], low, high, reference, largest, upright, upward)
 
     @classmethod
     def fixture(cls, poses: Sequence[RigidTransform]) -> PlacementConstraints:
@@ -134,21 +138,24 @@ class PlacementConstraints(Value):
                 origins = origins.copy()
                 origins[:, k] = np.where(beyond, drawn, origins[:, k])
         if self.turn_is_bounded:
-            axes, angles = _turns(self.reference.T @ rotations)
+            axes, angles = _turns(self.reference.T @ self._upright(rotations))
             drawn = np.where(angles > self.largest_turn, angles * self.largest_turn / np.pi, angles)
             rotations = self.reference @ _rotations(axes, drawn)
         return self.nearest(rotations, origins)
 
     def nearest(self, rotations: Floats, origins: Floats) -> tuple[Floats, Floats]:
         """Return allowed placements near to rotations (S, 3, 3) and origins (S, 3); allowed ones are not changed."""
-        if self.upright.any():
-            rotations = _swing(rotations @ self.upright, self.normal) @ rotations
-        elif self.turn_is_bounded:
+        rotations = self._upright(rotations)
+        if self.turn_is_bounded:
             axes, angles = _turns(self.reference.T @ rotations)
             beyond = angles > self.largest_turn
             back = self.reference @ _rotations(axes, np.minimum(angles, self.largest_turn))
             rotations = np.where(beyond[:, None, None], back, rotations)
         return rotations, np.clip(origins, self.low, self.high)
+
+    def _upright(self, rotations: Floats) -> Floats:
+        """Return rotations (S, 3, 3) swung so that the part stands upright; the same where nothing must."""
+        return _swing(rotations @ self.upright, self.normal) @ rotations if self.upright.any() else rotations
 
     def nearest_to(self, transform: RigidTransform) -> RigidTransform:
         """Return an allowed placement near to a given one; the same if it is allowed."""
@@ -169,7 +176,7 @@ class PlacementConstraints(Value):
                 continue
             rows += [origin[k] - float(self.low[k])] if np.isfinite(self.low[k]) else []
             rows += [float(self.high[k]) - origin[k]] if np.isfinite(self.high[k]) else []
-        if self.turn_is_bounded:
+        if self.turn_is_bounded and self.motion[3:].any():  # else held by the motion's columns
             trace = sum(float(self.reference[i, j]) * rotation[i, j] for i in range(3) for j in range(3))
             rows.append(0.5 * (trace - 1.0) - float(np.cos(self.largest_turn)))
         return rows
@@ -177,6 +184,16 @@ class PlacementConstraints(Value):
 
 FREE = PlacementConstraints.free()
 """All six degrees of freedom, without bounds."""
+
+
+def _standing(upright: Floats, normal: Floats, turn: float) -> Floats:
+    """Return the rotation (3, 3) of a part on a table whose x axis, or y where x is upright, points to `turn`."""
+    axis = np.eye(3)[0 if abs(upright[0]) < np.sqrt(0.75) else 1]
+    along = axis - (axis @ upright) * upright
+    along /= np.linalg.norm(along)
+    there = np.array([np.cos(turn), np.sin(turn), 0.0])
+    part = np.stack([along, np.cross(upright, along), upright])
+    return np.asarray(np.stack([there, np.cross(normal, there), normal]).T @ part, dtype=np.float64)
 
 
 def _swing(directions: Floats, target: Floats) -> Floats:

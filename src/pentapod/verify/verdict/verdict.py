@@ -71,6 +71,13 @@ class Certificate(Value):
     allowed: float | None = None
 
     @property
+    def sense(self) -> str:
+        """On which side of the bound the value may be: "at most" or "at least"; "bound" where the two are equal."""
+        if self.value is None or self.bound is None or self.value == self.bound:
+            return "bound"
+        return "at least" if (self.value > self.bound) == (self.passed and not self.is_lenient) else "at most"
+
+    @property
     def is_lenient(self) -> bool:
         """Whether the value is beyond its bound, but within what is allowed."""
         if self.value is None or self.bound is None or self.allowed is None or not self.passed:
