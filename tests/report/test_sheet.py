@@ -99,6 +99,16 @@ def test_sheet_command_writes_the_sheet_of_the_plan(planned, sheet, tmp_path, ca
     assert told((tmp_path / "again.html").read_text(encoding="utf-8")) == told(sheet)
 
 
+def test_a_sheet_that_is_written_anew_belongs_to_the_run(copied, sheet, monkeypatch):
+    """A later version may write another one: the run stays whole, and is read again."""
+    monkeypatch.setattr("pentapod.report.sheet.page.sheet_html", lambda pages: f"<p>{len(pages)} page, as of later</p>")
+    assert command(["sheet", str(copied / "out")]) == 0
+    assert (copied / "out" / "sheet.html").read_text(encoding="utf-8") == "<p>1 page, as of later</p>"
+    monkeypatch.undo()
+    assert command(["sheet", str(copied / "out")]) == 0
+    assert told((copied / "out" / "sheet.html").read_text(encoding="utf-8")) == told(sheet)
+
+
 def refused(capsys, *arguments: str | Path) -> str:
     """The one line by which a command refuses its arguments."""
     assert command(["sheet", *map(str, arguments)]) == 2

@@ -69,7 +69,7 @@ def _transaction(folder: Path) -> Generator[Path]:
             raise unwritable(folder, error) from error
         try:
             yield staging
-            _write_manifest(staging)
+            write_manifest(staging)
         except InputError as error:
             if error.file is None or staging not in Path(error.file).parents:
                 raise
@@ -207,10 +207,10 @@ def _run_files(folder: Path) -> list[Path]:
     return [(part / name).relative_to(folder) for part in parts for name in NAMES if (part / name).is_file()]
 
 
-def _write_manifest(folder: Path) -> None:
+def write_manifest(folder: Path) -> None:
     """Write manifest.json of a run's folder, and first that of each of its set-ups."""
     for part in sorted(path for path in folder.glob(SETUPS) if path.is_dir()):
-        _write_manifest(part)
+        write_manifest(part)
     files = [relative for relative in _run_files(folder) if relative != Path(MANIFEST)]
     entries = {
         relative.as_posix(): {"sha256": sha256_of(folder / relative), "bytes": (folder / relative).stat().st_size}

@@ -32,12 +32,18 @@ def sheet(folder: Path, job: Path | None, out: Path | None, as_json: bool, quiet
     program, and a job, part or machine that was changed since.
     """
     from pentapod.job.artefacts import SHEET
+    from pentapod.job.run_folder import locked, write_manifest
     from pentapod.report.sheet.page import write_pages
 
     with progress_bar(quiet=quiet or as_json) as progress:
         pages = sheet_pages(folder, job, progress)
         progress("sheet", 0.8, "drawings")
-        file = write_pages(pages, folder / SHEET if out is None else out)
+        if out is None:
+            with locked(folder):  # the sheet is one of the run's files, which its manifest lists
+                file = write_pages(pages, folder / SHEET)
+                write_manifest(folder)
+        else:
+            file = write_pages(pages, out)
     if as_json:
         echo_json({"file": str(file), "pages": len(pages)})
     elif not quiet:
