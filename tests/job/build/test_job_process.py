@@ -1,6 +1,4 @@
-import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,12 +6,12 @@ import pytest
 from pentapod.base.errors import JobError
 from pentapod.job import Job, run
 from pentapod.job.build.process import continued, with_process
-from pentapod.program import read_csv
+from pentapod.job.build.toolpath import job_toolpath
+from pentapod.job.build.values import job_mesh
+from pentapod.program import Switch, read_csv
 from pentapod.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.toolpath.formats import read_toolpath
-from pentapod.toolpath.process import Process
+from pentapod.toolpath.formats import read_toolpath, write_toolpath
 
-CAM = Path(__file__).parents[2] / "toolpath" / "formats" / "cam"
 FEED = "[feed]\ncut_mm_min = 3000"
 SAID = (("T1", "M6", "S9000", "M4", "M0"), ("M8",), (), (), ("M9", "M5"))
 
@@ -91,15 +89,19 @@ def test_bad_keys_are_refused_with_their_line(make_job, line, what):
 
 @pytest.mark.slow
 def test_words_of_a_cam_file_and_keys_of_a_job_reach_the_program_and_its_verdict(make_job, tmp_path):
-    shutil.copy(CAM / "table_table_no_tcp.nc", tmp_path / "a.nc")
-    keys = 'strategy = "file"\nfile = "a.nc"\nrotary_axes = ["table C", "table A"]\nrotary_centre_mm = [12, -7, -55]'
+    plain = Job.load(make_job())
+    made = with_process(
+        plain.with_(process={"tool_number": 7, "spindle_rpm": 8000}), job_toolpath(plain, job_mesh(plain))[0]
+    )
+    write_toolpath(made, tmp_path / "a.ngc")
+    keys = 'strategy = "file"\nfile = "a.ngc"'
     job = Job.load(make_job(("stepover_mm = 15\nspacing_mm = 4", keys))).with_(process={"laser_power": 0.5})
     outcome = run(job, tmp_path / "out", advice=None)
     names = {each.claim: each for each in outcome.verdict.certificates}
     assert names["process data"].passed, names["process data"].method
-    file = next((tmp_path / "out").glob("[pw]*.csv"))
-    program = read_csv(file)
-    assert Process().after(program.switches[0].words).words[:3] == ("T7", "M6", "S8000")
+    program = read_csv(tmp_path / "out" / "program.csv")
+    assert program.switches[0] == Switch(0, ("T7", "M6", "S8000", "M3"))
+    assert program.switches[-1] == Switch(len(program.legs) - 1, ("M5",))
     assert set(np.unique(program.laser_power)) == {0.0, 0.5}
     assert program.laser_power[0] == program.laser_power[-1] == 0.0
 

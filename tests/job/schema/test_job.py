@@ -204,9 +204,9 @@ def test_every_key_is_described_and_has_its_unit():
         "then", "setups", "weight_strokes", "weight_singularities", "weight_joints", "weight_bodies",
         "entry", "fill", "upright", "curve", "form", "which", "laying", "centred", "text", "letter_spacing", "align",
         "towards", "effect", "levels", "threshold", "frame", "use", "waive", "lowest_share", "left_share",
-        "rotary_axes", "tool",
+        "rotary_axes", "tool", "coolant", "tool_number", "laser_power",
     }  # fmt: skip
-    units = ("_mm", "_deg", "_mm_min", "_ms", "_s", "_n", "_mm_s2", "_mm_s3", "_deg_s", "_deg_s2")
+    units = ("_mm", "_deg", "_mm_min", "_ms", "_s", "_n", "_mm_s2", "_mm_s3", "_deg_s", "_deg_s2", "_rpm")
     models = [table_model(name) for name in JobTables.model_fields if name != "toolpath"]
     for model in [*models, *(table_model("toolpath", name) for name in job_strategies())]:
         assert model.__doc__
