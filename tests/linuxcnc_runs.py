@@ -15,7 +15,7 @@ import pytest
 def missing() -> str:
     if shutil.which("linuxcnc") is None or shutil.which("halrun") is None:
         return "linuxcnc-uspace is not installed"
-    own = ["--net", "--ipc", "--mount"]
+    own = ["--net", "--ipc", "--mount", "--pid", "--fork", "--mount-proc"]
     for words in (["unshare", *own], ["unshare", "--map-current-user", "--keep-caps", *own]):
         if subprocess.run([*words, "true"], capture_output=True, check=False).returncode == 0:
             return ""

@@ -5,8 +5,10 @@ cd "$(dirname "$0")"
 command -v linuxcnc >/dev/null || { echo "play.sh needs LinuxCNC: the package linuxcnc-uspace" >&2; exit 1; }
 if [ "${1:-}" != inside ]; then
   # linuxcncsvr listens on all addresses: no network. Its own shared memory as well.
-  if unshare --net --ipc --mount true 2>/dev/null; then exec unshare --net --ipc --mount sh play.sh inside; fi
-  exec unshare --map-current-user --keep-caps --net --ipc --mount sh play.sh inside
+  # Its own processes: LinuxCNC ends by killing every milltask of the host by name, those of a machine that runs too.
+  own="--net --ipc --mount --pid --fork --kill-child --mount-proc"
+  if unshare $own true 2>/dev/null; then exec unshare $own sh play.sh inside; fi
+  exec unshare --map-current-user --keep-caps $own sh play.sh inside
 fi
 ip link set lo up
 scratch=$(mktemp -d)
