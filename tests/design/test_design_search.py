@@ -2,7 +2,9 @@
 
 import json
 import shutil
+import tomllib
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -175,7 +177,9 @@ def test_a_table_moves_with_the_work_volume(design_file):
     """Its height counts from the base, whose distance from the work volume is a designer's choice."""
     file = DesignFile.load(design_file())
     job = Job.load(TOOLPATHS / "dome.toml")
-    moved = job_on_design(job, file, {"work_volume": {"centre_mm": [0.0, 0.0, 567.0]}})
+    machine = tomllib.loads((resources.files("pentapod.machine.library") / "desk.toml").read_text(encoding="utf-8"))
+    machine["work"]["centre_mm"][2] += 100.0
+    moved = job_on_design(job, file, machine)
     assert (job.placement.table_z_mm, moved.placement.table_z_mm) == (450.0, pytest.approx(550.0))
     free = job.with_(placement={"mode": "free", "table_z_mm": None})
     assert job_on_design(free, file, {}) is free

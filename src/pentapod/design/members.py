@@ -199,5 +199,5 @@ def job_on_design(job: Job, file: DesignFile, machine: Mapping[str, Any]) -> Job
     """Return a job on a designed machine: its table keeps its height in the work volume."""
     if job.placement.table_z_mm is None:
         return job
-    rise_mm = machine["work_volume"]["centre_mm"][2] - 1e3 * float(file.unknowns.start.centre[2])
+    rise_mm = machine["work"]["centre_mm"][2] - 1e3 * float(file.unknowns.start.centre[2])
     return job.with_(**{"placement.table_z_mm": job.placement.table_z_mm + rise_mm})
