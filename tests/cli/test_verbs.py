@@ -57,14 +57,17 @@ def test_verify_fails_a_program_that_was_changed(make_job, tmp_path, capsys):
     write_csv(type(program)(program.period, legs, program.interpolation, program.component, program.placement,
                             program.provenance), out / "program.csv")  # fmt: skip
     assert run(["verify", str(out / "program.csv"), "--job", str(job)]) == 1
-    said = capsys.readouterr().out
-    assert "FAIL  tip deviation" in said
-    assert "verdict: FAILED" in said
+    told = capsys.readouterr()
+    assert "FAIL  tip deviation" in told.out
+    assert "verdict: FAILED" in told.out
+    assert "another job" not in told.err
     assert (
         run(["verify", str(out / "program.csv"), "--job", str(make_job(("cut_mm_min = 3000", "cut_mm_min = 2900")))])
         == 1
     )
-    assert "FAIL  job" in capsys.readouterr().out
+    told = capsys.readouterr()
+    assert "FAIL  job" in told.out
+    assert "was made from another job than" in told.err
 
 
 def test_json_and_quiet(make_job, tmp_path, capsys):

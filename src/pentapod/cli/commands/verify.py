@@ -23,11 +23,17 @@ def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -
     the job. For a job in several set-ups name the folder, so that it is judged whether they make every cut. A claim
     that cannot be judged is listed and fails, unless the job waives it ([verify] waive).
     """
+    from pentapod.job.artefacts import PROGRAM
     from pentapod.job.schema.job import Job
     from pentapod.job.verdict import judge
+    from pentapod.program.csv import read_header
 
     note_changes(program.parent)
     loaded = Job.load(job)
+    file = program / PROGRAM if program.is_dir() else program
+    if file.is_file() and read_header(file).provenance.job_digest != loaded.digest:
+        # At once: judging takes long, and longer where the path is not that of the job.
+        click.echo(f"note: {program} was made from another job than {job}, or from another state of it", err=True)
     with progress_bar(quiet=quiet or as_json) as progress:
         verdict = judge(loaded, program, progress, strict=strict)
     if as_json:
