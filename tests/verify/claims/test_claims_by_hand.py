@@ -185,7 +185,7 @@ def test_a_claim_gives_plain_numbers(replay):
     certificate = claim_of(allowed)(replay)
     assert (certificate.bound, certificate.allowed) == (0.5, 0.666666666667)
     assert certificate.is_lenient
-    assert "(bound 0.5, 0.666667 allowed)" in verdict_text(Verdict((certificate,)))
+    assert "(at most 0.5, 0.666667 allowed)" in verdict_text(Verdict((certificate,)))
     for other in (replace(allowed, value=0.5), replace(allowed, passed=False), replace(allowed, allowed=None)):
         assert not claim_of(other)(replay).is_lenient
         assert "allowed" not in verdict_text(Verdict((claim_of(other)(replay),)))
