@@ -67,6 +67,22 @@ def good(request):
     return request.getfixturevalue(request.param)
 
 
+LOWER_BOUNDS = {
+    *("component kept, w", "component kept, S", "legs not too short", "platform joints not too closed"),
+    *("clearance between legs and shaft", "lowest feed", "legs clear of the tool body", "legs clear of the part"),
+    *("spindle clear of the part", "tool body clear of the part"),
+}
+"""Claims whose values must not fall below their bounds; each is one of most programs."""
+
+
+def test_bounds_are_told_as_what_they_are(good):
+    """Also where a value is on the bound, or beyond it by what is tolerated; a leg that is moved changes no sense."""
+    for legs in (good.program.legs, good.program.legs + 0.02):
+        for found in judge(with_legs(good, legs)).certificates:
+            if found.value is not None and found.bound is not None:
+                assert found.sense == ("at least" if found.claim in LOWER_BOUNDS else "at most"), found.claim
+
+
 def test_good_program_passes_every_claim(good):
     verdict = judge(good)
     assert failed(verdict) == set()

@@ -189,6 +189,8 @@ def test_a_claim_gives_plain_numbers(replay):
     for other in (replace(allowed, value=0.5), replace(allowed, passed=False), replace(allowed, allowed=None)):
         assert not claim_of(other)(replay).is_lenient
         assert "allowed" not in verdict_text(Verdict((claim_of(other)(replay),)))
+    low = claim_of(replace(HELD, value=0.4999, bound=0.5, at_least=True))(replay)
+    assert "(at least 0.5)" in verdict_text(Verdict((low,)))
     assert claim_of(Idle("nothing there"))(replay) == Idle("nothing there")
 
 

@@ -47,7 +47,7 @@ def clearance(replay: Replay) -> Finding:
         f"{pair_names(machine)[pair]} come closest; proven lower bound for all times, surface to surface: distance at "
         "the rows and halfway between, less the largest possible approach until the next sample"
     )
-    return Finding(least > 0.0, MM * least, 0.0, "mm", replay.place(at), method)
+    return Finding(least > 0.0, MM * least, 0.0, "mm", replay.place(at), method, at_least=True)
 
 
 CLAIMS = (Claim("clearance between legs and shaft", clearance, needs_proof=True),)

@@ -79,7 +79,8 @@ def _clear(replay: Replay, *, obstacle: Obstacle, collision_world: CollisionWorl
     found = clearance_bound(replay, gaps, approaches, offsets, bound=bound)
     name, far = collision_world.names(machine)[columns[found.column]], TOOL_FAR_M if tool else FAR_M
     if found.gap > bound and _enclosed(replay, obstacle, frame, columns):
-        return Finding(False, None, MM * bound, "mm", replay.place(0), f"{name} is inside the {obstacle.name}")
+        inside = f"{name} is inside the {obstacle.name}"
+        return Finding(False, None, MM * bound, "mm", replay.place(0), inside, at_least=True)
     method = f"{name} comes closest; exact distance of its body from the mesh, {_PROVEN}"
     if not found.proven:
         method = f"{name}: not proven; {method}"
@@ -87,8 +88,8 @@ def _clear(replay: Replay, *, obstacle: Obstacle, collision_world: CollisionWorl
         method = f"{name} is in the {obstacle.name}; exact at this moment, it may be deeper elsewhere"
     elif found.gap >= 0.5 * far:
         method = f"nothing comes close; distances were computed up to {MM * far:g} mm; {_PROVEN}"
-    value = MM * found.gap
-    return Finding(found.gap > bound, value, MM * bound, "mm", replay.place(found.sample), method)
+    where = replay.place(found.sample)
+    return Finding(found.gap > bound, MM * found.gap, MM * bound, "mm", where, method, at_least=True)
 
 
 def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
@@ -107,7 +108,7 @@ def _legs_and_tool(replay: Replay, *, tool: tuple[Solid, ...]) -> Finding:
         f"{bars[found.column]} comes closest; distance of its body from shank and holder in the plane of leg and "
         f"tool axis, {_PROVEN}"
     )
-    return Finding(found.gap > 0.0, MM * found.gap, 0.0, "mm", replay.place(found.sample), method)
+    return Finding(found.gap > 0.0, MM * found.gap, 0.0, "mm", replay.place(found.sample), method, at_least=True)
 
 
 def line_offsets(machine: Machine, tool: tuple[Solid, ...]) -> Floats:

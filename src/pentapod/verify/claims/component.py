@@ -53,7 +53,7 @@ def _finding(replay: Replay, measure: ProvenMeasure, column: int) -> Finding:
         how=measure.method,
         error=MM * replay.path_tolerance,
     )
-    return Finding(passed, least, 0.0, measure.unit, replay.place(2 * interval), method)
+    return Finding(passed, least, 0.0, measure.unit, replay.place(2 * interval), method, at_least=True)
 
 
 NAMED = ("w", "S", "roll")

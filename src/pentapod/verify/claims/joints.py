@@ -65,7 +65,9 @@ def within_ranges(replay: Replay) -> Finding | Idle:
     method = f"{_ENDS[columns[found.column]]} comes closest, angles as arcs of the shortest strut; proven for all times"
     if not found.proven:
         method = f"not proven; {method}"
-    return Finding(found.gap >= 0.0 and found.proven, MM * found.gap, 0.0, "mm", replay.place(found.sample), method)
+    return Finding(
+        found.gap >= 0.0 and found.proven, MM * found.gap, 0.0, "mm", replay.place(found.sample), method, at_least=True
+    )
 
 
 def _finding(replay: Replay, extreme: RunningMaximum, angles: Floats, limit: Floats, *, sign: int) -> Finding:
@@ -74,7 +76,8 @@ def _finding(replay: Replay, extreme: RunningMaximum, angles: Floats, limit: Flo
     value, bound = float(angles[leg]), float(limit[leg])
     passed = sign * value <= sign * bound
     method = _METHOD.format(leg=leg + 1)
-    return Finding(passed, np.degrees(value), np.degrees(bound), "deg", replay.place(int(extreme.at[leg])), method)
+    where = replay.place(int(extreme.at[leg]))
+    return Finding(passed, np.degrees(value), np.degrees(bound), "deg", where, method, at_least=sign < 0)
 
 
 def _angles(cosines: Floats) -> Floats:

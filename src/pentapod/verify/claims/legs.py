@@ -19,7 +19,8 @@ def shortest(replay: Replay) -> Finding:
     found, limit = replay.interval_bounds.shortest, replay.machine.legs.min_length
     leg = int(np.argmin(-found.values - limit))
     value, bound = -float(found.values[leg]), float(limit[leg])
-    return Finding(value >= bound, MM * value, MM * bound, "mm", _place(replay, found, leg), _method(leg, _EXACT))
+    where, method = _place(replay, found, leg), _method(leg, _EXACT)
+    return Finding(value >= bound, MM * value, MM * bound, "mm", where, method, at_least=True)
 
 
 def longest(replay: Replay) -> Finding:

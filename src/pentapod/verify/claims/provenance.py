@@ -52,12 +52,12 @@ def guides(replay: Replay) -> Finding | Idle:
     if machine.guides is None:
         return Idle("the machine has no guides")
     if rail_positions is None:
-        return Finding(False, None, 0.0, "mm", Place(), "the header has no positions of the guides")
+        return Finding(False, None, 0.0, "mm", Place(), "the header has no positions of the guides", at_least=True)
     least, greatest = machine.guides.travel.T
     distances = MM * np.minimum(np.array(rail_positions) - least, greatest - np.array(rail_positions))
     positions = ", ".join(f"{MM * position:.6g}" for position in rail_positions)
     method = f"header: guides at {positions} mm; smallest distance of a guide to an end of its travel"
-    return Finding(bool(distances.min() >= 0.0), float(distances.min()), 0.0, "mm", Place(), method)
+    return Finding(bool(distances.min() >= 0.0), float(distances.min()), 0.0, "mm", Place(), method, at_least=True)
 
 
 def component(replay: Replay) -> Finding | Idle:

@@ -75,7 +75,7 @@ def lowest_feed(replay: Replay) -> Finding | Idle:
     )
     if slow.any():
         method += f"; slower than the bound for {np.count_nonzero(slow) * period:.3g} s in all"
-    return Finding(value >= bound, 100.0 * value, 100.0 * bound, "%", replay.place(2 * row), method)
+    return Finding(value >= bound, 100.0 * value, 100.0 * bound, "%", replay.place(2 * row), method, at_least=True)
 
 
 def unasked_stop(replay: Replay) -> Finding:

@@ -49,7 +49,8 @@ def dwells(replay: Replay) -> Finding | Idle:
         f"dwell with the largest shortfall, of {len(required)}: longest time in which no leg moves more than "
         f"{MM * STILL_M:g} mm from row to row, within the path tolerance of the place"
     )
-    return Finding(value >= bound - DWELL_TOLERANCE_S, value, bound, "s", replay.place(2 * required[worst][0]), method)
+    passed, where = value >= bound - DWELL_TOLERANCE_S, replay.place(2 * required[worst][0])
+    return Finding(passed, value, bound, "s", where, method, at_least=True)
 
 
 def required_stops(replay: Replay) -> list[tuple[int, int, float]]:

@@ -26,7 +26,7 @@ def with_allowance(bound: float) -> float:
 
 @dataclass(frozen=True)
 class Finding:
-    """The answer of a claim: a certificate without its name."""
+    """The answer of a claim: a certificate without its name. at_least: whether the bound is a lower one."""
 
     passed: bool
     value: float | None
@@ -35,6 +35,7 @@ class Finding:
     where: Place
     method: str
     allowed: float | None = None
+    at_least: bool = False
 
     @classmethod
     def without_value(cls, passed: bool, method: str, where: Place | None = None) -> Finding:
@@ -98,7 +99,8 @@ class Claim(Value):
         if isinstance(found, Idle):
             return found
         value, bound, allowed = _plain(found.value), _plain(found.bound), _plain(found.allowed)
-        return Certificate(self.name, bool(found.passed), value, bound, found.unit, found.where, found.method, allowed)
+        numbers = value, bound, found.unit, found.where, found.method, allowed
+        return Certificate(self.name, bool(found.passed), *numbers, at_least=found.at_least)
 
     def inapplicable(self, idle: Idle) -> Certificate:
         """Return the certificate of a strict verdict for a claim that does not apply."""

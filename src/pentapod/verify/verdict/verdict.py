@@ -52,7 +52,7 @@ class Certificate(Value):
 
     unit: as in files, mm, deg, mm/s, …. method: how the value was computed, and what it covers (at the rows or between
     them, proven or sampled). allowed: largest value that passes although it is beyond its bound, for the reason in
-    `method`; None where there is no such tolerance.
+    `method`; None where there is no such tolerance. at_least: whether the bound is a lower one.
 
     >>> claim = verdict.certificates[0]
     >>> claim.claim, claim.passed
@@ -69,13 +69,12 @@ class Certificate(Value):
     where: Place
     method: str
     allowed: float | None = None
+    at_least: bool = False
 
     @property
     def sense(self) -> str:
-        """On which side of the bound the value may be: "at most" or "at least"; "bound" where the two are equal."""
-        if self.value is None or self.bound is None or self.value == self.bound:
-            return "bound"
-        return "at least" if (self.value > self.bound) == (self.passed and not self.is_lenient) else "at most"
+        """On which side of the bound the value may be: "at most" or "at least"."""
+        return "at least" if self.at_least else "at most"
 
     @property
     def is_lenient(self) -> bool:
