@@ -120,7 +120,7 @@ def test_artefacts_agree_with_each_other(usual):
     assert verdict == outcome.to_dict()
     assert verdict["passed"] is True
     assert set(verdict["certificates"][0]) == {
-        "claim", "passed", "value", "bound", "unit", "where", "method", "allowed"
+        "claim", "passed", "value", "bound", "unit", "where", "method", "allowed", "at_least"
     }  # fmt: skip
     with np.load(out / "plan.npz") as arrays:
         assert np.array_equal(arrays["program.legs_mm"], program.legs * 1e3)
