@@ -73,7 +73,8 @@ def test_the_command_says_how_many(monkeypatch, capsys):
     few = [call for call in signatures() if call[0] == "timing.jerk.spline_kernels:solve_banded"]
     monkeypatch.setattr(warm_up, "signatures", lambda: few)
     assert run(["warm-up", "-j", "1"]) == 0
-    assert re.match(r"1 kernels are ready, [01] compiled now, \d+ s\n", capsys.readouterr().out)
+    said = r"1 kernels are ready, in 1 forms for the types of their arguments; [01] forms compiled now, \d+ s\n"
+    assert re.match(said, capsys.readouterr().out)
     assert run(["warm-up", "-j", "0"]) == 2
     assert compile_all(few)[0] == 1
 

@@ -227,7 +227,7 @@ def test_report_shows_claims_not_judged_with_the_reason(make_job, tmp_path):
         )  # fmt: skip
         _, page = page_of(told, tmp_path)
         text = " ".join(page.text.split())
-        assert f"job {'✓' if waived else '✗'} {status}" in text
+        assert f"{outcome.job.path.parent.name} {'✓' if waived else '✗'} {status}" in text
         assert lead in text
         assert "claims about the program do not hold" not in text
         for name in ("speed of sound", "colour"):

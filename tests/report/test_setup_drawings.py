@@ -102,6 +102,17 @@ def test_setup_labels_are_apart_wherever_the_part_is(standing, shift, tilt):
         check_labels(setup_drawings(run, touch_off_points(run)))
 
 
+@pytest.mark.parametrize("turn", [0.0, 44.0, 90.0])
+def test_numbers_of_touch_off_points_do_not_cover_each_other(standing, turn):
+    """From the side, points behind each other have their numbers side by side."""
+    run = standing("desk", (0.0, 0.0, 0.0), turn, 0.0)
+    points = touch_off_points(run)
+    for drawing in drawings(setup_drawings(run, points))[2:]:
+        circles = np.array(re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)" r="(?:7|5\.5)', drawing), dtype=float)
+        assert len(circles) == len(points) + 1, "the numbers and the datum"
+        assert min(np.linalg.norm(a - b) for a, b in combinations(circles, 2)) > 12.0
+
+
 def test_setup_dimensions_are_those_of_the_part_and_its_place(standing):
     run = standing("desk", (20.0, 10.0, 5.0), 30.0)
     found = [{kind: [] for kind in ("dimension", "coordinate")} for _ in range(4)]

@@ -29,7 +29,8 @@ LIBRARY = files("pentapod.machine.library")
 @pytest.fixture(scope="module")
 def planned(tmp_path_factory):
     """The folder of a small job whose run is in `out`, with its sheet, and the outcome."""
-    folder = tmp_path_factory.mktemp("sheet")
+    folder = tmp_path_factory.mktemp("sheet") / "bracket"
+    folder.mkdir()
     (folder / "part.stl").write_bytes(dome_stl(cells=12))
     (folder / "desk.toml").write_text(LIBRARY.joinpath("desk.toml").read_text(encoding="utf-8"), encoding="utf-8")
     text = job_text().replace("diameter_mm = 10", "diameter_mm = 10\nflute_mm = 20")
@@ -45,8 +46,8 @@ def sheet(planned):
 
 @pytest.fixture
 def copied(planned, tmp_path):
-    shutil.copytree(planned[0], tmp_path / "copy")
-    return tmp_path / "copy"
+    shutil.copytree(planned[0], tmp_path / "bracket")
+    return tmp_path / "bracket"
 
 
 def told(text: str) -> str:

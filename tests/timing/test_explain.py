@@ -1,6 +1,7 @@
 """Explanation: times and costs add up, the bound is one, and places are named where they were put."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -93,3 +94,16 @@ def test_explanation_is_json_for_a_report():
     assert len(content["words"]) == len(content["places"])
     assert max(use["share"] for use in content["uses"] if "jerk" not in use["quantity"]) <= 1.01
     assert str(story).splitlines()[0].startswith("cycle time ")
+
+
+def test_summary_of_a_cycle_time_adds_up_the_legs_and_begins_with_the_longest():
+    m = machine()
+    story = explain(timed(Path((raster(lines=4, width=0.08, feed=0.3),)), m), m)
+    title, *lines = story.in_short().splitlines()
+    assert title == str(story).splitlines()[0]
+    told = {line.strip().split("-limited for ")[0]: float(line.split(" for ")[1].split(" s")[0]) for line in lines}
+    assert list(told.values()) == sorted(told.values(), reverse=True)
+    assert not any(re.match(r"leg \d", name) for name in told)
+    acceleration = sum(cause.time for cause in story.causes if cause.name.endswith(" acceleration"))
+    assert sum(cause.name.endswith(" acceleration") for cause in story.causes) > 1
+    assert told["leg acceleration"] == pytest.approx(acceleration, rel=6e-3)

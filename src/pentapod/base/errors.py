@@ -128,5 +128,8 @@ def _printable(text: str) -> str:
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return ``did you mean "…"?`` with the known name closest to `name`, or the list of known names."""
     names = sorted(known)
+    longer = [each for each in names if name and each.startswith(f"{name}_")]
+    if len(longer) == 1:  # the unit of the key is left out
+        return f'did you mean "{longer[0]}"?'
     close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     return f'did you mean "{close[0]}"?' if close else "known: " + ", ".join(names)

@@ -11,21 +11,23 @@ if TYPE_CHECKING:
 
 MOST_RANGES = 6
 """Ranges of waypoints that a row shows."""
+MOST_LIMITS = 12
+"""Limits of a plan that are shown, besides those that are the nearest one somewhere."""
 
 
 def limits_text(found: Sequence[ActiveLimit]) -> str:
-    """Return the table of a plan: every limit with its smallest margin, the nearest first."""
-    lines = [
-        f"{'limit':<46} {'margin':>8} {'room':>12} {'waypoint':>9} {'nearest at':>10}  waypoints where it is nearest"
-    ]
-    for limit in found:
+    """Return the table of a plan: the nearest limits with their smallest margins, the nearest first."""
+    lines = [f"{'limit':<46} {'margin':>8} {'room':>12} {'waypoint':>9} {'of path':>10}  waypoints where it is nearest"]
+    shown = [limit for k, limit in enumerate(found) if k < MOST_LIMITS or limit.share]
+    for limit in shown:
         room = f"{limit.room:.3g} {limit.unit}" if limit.unit else ""
         share = f"{100.0 * limit.share:.1f} %" if limit.share else "–"
         where = _ranges(limit.waypoints)
         lines.append(
             f"{limit.limit:<46} {limit.margin:>8.4f} {room:>12} {limit.worst:>9} {share:>10}  {where}".rstrip()
         )
-    return "\n".join(lines)
+    rest = len(found) - len(shown)
+    return "\n".join([*lines, *([f"{rest} more limits have larger margins"] if rest else [])])
 
 
 def shortfalls_text(refusal: Refusal) -> str:

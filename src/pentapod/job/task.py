@@ -122,7 +122,9 @@ class Task:
             return trajectory
         program = self.runner.run("program", lambda: self._program(placed, trajectory, file))
         self.runner.run(
-            "explain", lambda: explanation(path, trajectory, program, self.machine, self.toolpath), remark=str
+            "explain",
+            lambda: explanation(path, trajectory, program, self.machine, self.toolpath),
+            remark=Explanation.in_short,
         )
         return program
 

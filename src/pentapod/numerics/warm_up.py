@@ -50,7 +50,7 @@ def warm_up(processes: int | None = None, progress: Progress = silent) -> tuple[
     with get_context("spawn").Pool(processes, initializer=_leave_interrupts) as pool:
         for found, misses in pool.imap_unordered(compile_all, work):
             done, compiled = done + found, compiled + misses
-            progress("compile", done / count, f"{done} of {count} kernels")
+            progress("compile", done / count, f"{done} of {count} forms of kernels")
     return count, compiled
 
 

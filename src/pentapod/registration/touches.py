@@ -156,6 +156,8 @@ def read_touches(path: str | Path) -> Touches:
     names = tuple(name.strip() for name in rows[0][1].split(","))
     if names != column_names(len(names)) or len(names) < 2:
         expected = "leg1_mm,leg2_mm,... in their order"
+        if ";" in rows[0][1]:
+            expected += ", with commas between the columns, and decimal points"
         raise InputError("wrong column names", file=file, line=rows[0][0], value=rows[0][1][:80], expected=expected)
     legs = np.array([_row(line, names, k, file) for k, line in rows[1:]]).reshape(-1, len(names))
     return Touches(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from pentapod.base.tables import TomlTable
@@ -23,6 +25,11 @@ def duration(seconds: float) -> str:
     if seconds >= 60:
         return f"{int(seconds // 60)} min {int(seconds % 60):02d} s"
     return f"{seconds:.3g} s"
+
+
+def job_title(path: Path) -> str:
+    """Return what pages call a job: the name of its file, or that of its folder where the file is job.toml."""
+    return path.stem if path.stem != "job" else path.resolve().parent.name or path.stem
 
 
 def opening(sentence: str, most: int = 100) -> str:

@@ -16,6 +16,9 @@ from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 from pentapod.verify.replay.free_space import PosedPolyline
 from pentapod.verify.replay.path_matching import PathMatch, match
 
+TO_TOOLPATH = "toolpath deviation"
+"""Name of the measure that the tolerance of a job bounds in its verdict."""
+
 
 @dataclass(frozen=True, eq=False)
 class Measure(Value):
@@ -83,7 +86,7 @@ class Tracking(Value):
             Measure("axis contour error", "deg", np.degrees(turned), "axis to the programmed one at that point"),
             Measure("tip error", "mm", 1e3 * off, "tip to where it is due at that time"),
             Measure("axis error", "deg", np.degrees(twist), "axis to the one due at that time"),
-            Measure("toolpath deviation", "mm", 1e3 * self._match.distances, "tip (or tilt centre) to the toolpath"),
+            Measure(TO_TOOLPATH, "mm", 1e3 * self._match.distances, "tip (or tilt centre) to the toolpath"),
             Measure("leg error", "mm", 1e3 * np.abs(played.legs - reference.program.legs).max(axis=1), "of any leg"),
             *self.more,
         )
@@ -117,6 +120,8 @@ class Tracking(Value):
             line += f" at {measure.row * period:.3f} s, rms {measure.rms:.2g} {measure.unit}"
             if self.cutting.any():
                 line += f"; on cuts at most {measure.values[self.cutting].max():.3g} {measure.unit}"
+            if measure.name == TO_TOOLPATH:
+                line += f" (tolerance of the job: {1e3 * self.tolerance:g} mm)"
             lines.append(line)
         return lines
 

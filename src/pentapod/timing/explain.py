@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -17,6 +18,7 @@ from pentapod.timing.time_law.slowed import Slowed
 from pentapod.timing.time_law.trajectory import Profile, Trajectory
 
 STANDSTILL = "standing still"
+_LEG = re.compile(r"^leg \d+ ")
 GAUSS_NODES = 0.5 + np.array([-0.5, 0.0, 0.5]) * np.sqrt(0.6)
 GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
@@ -109,20 +111,44 @@ class Explanation(Value):
         return self.duration - self.lower_bound
 
     def __str__(self) -> str:
-        lines = [
+        return f"{self._total()}\n{self.details()}"
+
+    def details(self) -> str:
+        """Return each limit by itself, the places where most time is lost, and the largest share used of each limit."""
+        lines = [f"  {line}" for line in (*self.causes, *self.places, *self.uses)]
+        if self.slow_cuts:
+            lines += [self._slow(), *(f"  {cut}" for cut in self.slow_cuts[: DEFAULT_PLACES.most])]
+        return "\n".join([*lines, *self._slowed(DEFAULT_PLACES.most)])
+
+    def _total(self) -> str:
+        return (
             f"cycle time {self.duration:.3f} s, {100.0 * self.gap / self.lower_bound:.1f} % above what feeds and leg "
             f"velocities alone would take ({self.lower_bound:.3f} s)"
-        ]
-        most = DEFAULT_PLACES.most
-        lines += [f"  {line}" for line in (*self.causes, *self.places, *self.uses)]
+        )
+
+    def _slow(self) -> str:
+        seconds, places = sum(cut.seconds for cut in self.slow_cuts), len(self.slow_cuts)
+        return f"cutting below the feed for {seconds:.3g} s, at {places} {'place' if places == 1 else 'places'}"
+
+    def _slowed(self, most: int) -> list[str]:
+        lines, more = [str(piece) for piece in self.slowed[:most]], len(self.slowed) - most
+        if more > 0:
+            verb = "piece lasts longer than its first law" if more == 1 else "pieces last longer than their first laws"
+            lines.append(f"{more} more {verb}")
+        return lines
+
+    def in_short(self) -> str:
+        """Return the cycle time, how long each kind of limit decides the speed, and what fell short of its feed."""
+        kinds: dict[str, Cause] = {}
+        for cause in self.causes:
+            name = _LEG.sub("leg ", cause.name)
+            other = kinds.get(name, Cause(name, 0.0, 0.0))
+            kinds[name] = Cause(name, other.time + cause.time, other.cost + cause.cost)
+        longest = sorted(kinds.values(), key=lambda cause: -cause.time)
+        lines = [self._total(), *(f"  {cause}" for cause in longest)]
         if self.slow_cuts:
-            seconds = sum(cut.seconds for cut in self.slow_cuts)
-            lines.append(f"cutting below the feed for {seconds:.3g} s, at {len(self.slow_cuts)} places")
-            lines += [f"  {cut}" for cut in self.slow_cuts[:most]]
-        lines += [str(piece) for piece in self.slowed[:most]]
-        if len(self.slowed) > most:
-            lines.append(f"{len(self.slowed) - most} more pieces last longer than their first laws")
-        return "\n".join(lines)
+            lines += [self._slow(), f"  {max(self.slow_cuts, key=lambda cut: cut.seconds)}"]
+        return "\n".join([*lines, *self._slowed(1)])
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content for JSON, SI units."""

@@ -12,6 +12,7 @@ import numpy as np
 from pentapod.base.errors import ArrayError, InputError
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.clamped.placed_job import placement_in
+from pentapod.report.words import job_title
 from pentapod.view.opened_run import OpenedRun
 from pentapod.view.replan import Replanned, Replanning
 from pentapod.view.viewed import ViewedRun, numbers_of, placement_of
@@ -60,7 +61,7 @@ class ServedRun:
 
     def _touch_off(self, given: dict[str, Any]) -> dict[str, Any]:
         return {
-            "name": f"{self.viewed.opened.job.path.stem}-touch-off.csv",
+            "name": f"{job_title(self.viewed.opened.job.path)}-touch-off.csv",
             "text": self.viewed.touch_off(_placement_of(given)),
         }
 

@@ -113,6 +113,19 @@ def test_a_part_that_is_far_away_is_planned_anew_or_refused(usual) -> None:
     assert replan(folder / "out", far, folder / "far").refusal is not None
 
 
+def test_a_surface_that_is_known_less_well_than_asked_is_no_placement(usual, capsys) -> None:
+    folder, _, truth = usual
+    touches, found = forged(folder, truth), folder / "within.toml"
+    asked = ["register", str(touches), "--job", str(folder / "job.toml"), "-o", str(found), "--within"]
+    assert pentapod([*asked, "0.0001", "--json"]) == 1
+    said = capsys.readouterr()
+    assert "--within asks for 0.0001 mm" in said.err
+    content = json.loads(said.out)
+    assert (content["registered"], content["out"], found.exists()) == (False, None, False)
+    assert pentapod([*asked, f"{1.01e-3 * content['uncertainty_um']}"]) == 0
+    assert found.exists()
+
+
 def test_outliers_are_named_by_their_lines(usual, capsys) -> None:
     folder, _, truth = usual
     touches = forged(folder, truth, outliers=[3, 20])
@@ -132,6 +145,7 @@ WRONG = {
     "a key is missing": ({"head": HEAD.split("\n", 1)[1]}, "probe_length_mm: the key is missing"),
     "another machine": ({"head": '# machine = "steep"\n' + HEAD}, "touches of another machine"),
     "other columns": ({"head": HEAD.replace("leg2", "leg3")}, "wrong column names"),
+    "semicolons": ({"head": HEAD.replace("_mm,leg", "_mm;leg")}, "with commas between the columns"),
     "text": ({"head": HEAD + "1,2,three,4,5\n"}, "not a row of finite numbers"),
 }
 

@@ -53,6 +53,7 @@ def test_a_changed_job_is_that_of_the_changed_file(make_job):
     [
         ({"toolpath": {"stepovr_mm": 2}}, 'toolpath.stepovr_mm: unknown key; did you mean "stepover_mm"?'),
         ({"feeds.cut_mm_min": 2}, 'feeds: unknown table; did you mean "feed"?'),
+        ({"feed": {"link": 1200}}, 'feed.link: unknown key; did you mean "link_mm_min"?'),
         ({"cut_mm_min": 2}, 'cut_mm_min: unknown key; did you mean "feed.cut_mm_min"?'),
         ({"feed.cut_mm_min": -2}, "feed.cut_mm_min: out of range (got -2); expected greater than 0"),
         ({"toolpath.strategy": "edges"}, 'toolpath.stepover_mm: the strategy "edges" has no such key; take it out'),

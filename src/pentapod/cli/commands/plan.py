@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE",
               help="Another value of a key: --set feed.cut_mm_min=1200; writes changed-job.toml, too. "
                    "Can be repeated.")  # fmt: skip
-@click.option("--explain", is_flag=True, help="Print the nearest limits: where, and by how much.")
+@click.option("--explain", is_flag=True, help="Print what limits the speed and the pose: where, and by how much.")
 @click.option("--advice", type=click.IntRange(0), metavar="N",
               help="How many changes to find for a job that cannot be done; 0: do not search. "
                    "1 when left out, but 0 if the error already says which unit the part must have.")  # fmt: skip
@@ -214,10 +214,12 @@ def _explained(outcome: Outcome) -> str:
     from pentapod.job.outcome import SetUps
     from pentapod.planning import PlacedPath
     from pentapod.planning.diagnosis import active_limits
+    from pentapod.timing import Explanation
 
     if (setups := outcome.find(SetUps)) is not None:
         return "\n\n".join(f"{part.folder}\n{_explained(part.outcome)}" for part in setups.parts)
     if outcome.refusal is not None and outcome.refusal.diagnosis:
         return shortfalls_text(outcome.refusal)
-    placed = outcome.find(PlacedPath)
-    return "" if placed is None else limits_text(active_limits(placed))
+    placed, story = outcome.find(PlacedPath), outcome.find(Explanation)
+    tables = [] if story is None else [f"limits on the speed, the most costly first\n{story.details()}"]
+    return "\n".join(tables if placed is None else [*tables, limits_text(active_limits(placed))])

@@ -44,18 +44,22 @@ def register() -> None:
 @click.option("--noise", "noise_um", type=Real(0.0, min_open=True), metavar="UM",
               help="Standard deviation of a touch, micrometres; else it is estimated from the residuals.")  # fmt: skip
 @click.option("--hold", is_flag=True, help="Motions that the touches do not determine stay as planned.")
+@click.option("--within", "within_mm", type=Real(0.0, min_open=True), metavar="MM",
+              help="Fail if the cut surface is known less well along its normals (95 %).")  # fmt: skip
 @json_option
 @quiet_option
-def fit(touches: Path, job: Path, out: Path, *, as_json: bool, quiet: bool, **given: Any) -> int:
+def fit(
+    touches: Path, job: Path, out: Path, *, within_mm: float | None, as_json: bool, quiet: bool, **given: Any
+) -> int:
     """Find the part from TOUCHES.csv: the leg lengths at each touch of the probe.
 
     Writes the placement as a table [placement] for a job, or for --placement of `plan` and `replan`. Prints the
     residual of each touch, how well the cut surface is known, and touches that do not fit. If the touches do not
-    determine the placement, the exit code is 1 and no file is written; the message names the motion, and further
-    touches.
+    determine the placement, or less well than --within asks, the exit code is 1 and no file is written; the message
+    names the motion, and further touches.
     """
     from pentapod.base.files import atomic_write
-    from pentapod.base.units import to_si
+    from pentapod.base.units import from_si, to_si
     from pentapod.job.clamped.registration import register_part
     from pentapod.job.schema.job import Job
 
@@ -64,18 +68,23 @@ def fit(touches: Path, job: Path, out: Path, *, as_json: bool, quiet: bool, **gi
         found = register_part(
             Job.load(job), touches, near=given["near"], noise=noise, hold=given["hold"], progress=progress
         )
-    if found.refused is None:
+    refused = None if found.refused is None else str(found.refused)
+    if refused is None and within_mm is not None and found.registration.uncertainty > to_si(within_mm, "mm"):
+        known = f"{from_si(found.registration.uncertainty, 'mm'):.3g} mm"
+        refused = f"the cut surface is known to {known} along its normals, --within asks for {within_mm:g} mm"
+    if refused is None:
         with atomic_write(out) as temporary:
             temporary.write_text(found.toml(), encoding="utf-8")
     if as_json:
-        echo_json({**_content(found), "out": str(out) if found.refused is None else None})
+        answer = {"registered": refused is None, "refusal": refused, "out": str(out) if refused is None else None}
+        echo_json({**_content(found), **answer})
     elif not quiet:
-        click.echo(_text(found))
-        if found.refused is None:
+        click.echo(_text(found, within_mm))
+        if refused is None:
             click.echo(f"wrote {out}")
-    if found.refused is not None:
-        click.echo(f"refused: {found.refused}", err=True)
-    return 0 if found.refused is None else 1
+    if refused is not None:
+        click.echo(f"refused: {refused}", err=True)
+    return 0 if refused is None else 1
 
 
 _SIZE = Real(0.0, min_open=True)
@@ -139,15 +148,17 @@ def plan(folder: Path, out: Path, count: int, *, as_json: bool, quiet: bool, **g
     return 0
 
 
-def _text(found: FoundPart) -> str:
-    from pentapod.base.units import from_si
+def _text(found: FoundPart, within_mm: float | None) -> str:
+    from pentapod.base.units import from_si, to_si
     from pentapod.job.clamped.registration import touch_names
     from pentapod.report.words import placement_sentences
 
     def um(value: float) -> str:
         return f"{from_si(value, 'um'):.2f} um"
 
-    result, tolerance = found.registration, found.job.tolerance.si.path
+    result = found.registration
+    wanted = f"tolerance.path_mm = {found.job.tolerance.path_mm:g}" if within_mm is None else f"{within_mm:g} mm"
+    tolerance = found.job.tolerance.si.path if within_mm is None else to_si(within_mm, "mm")
     lines = [
         f"{int(result.used.sum())} of {len(result.used)} touches used; residuals {um(result.rms)} rms, "
         f"{um(float(abs(result.residuals[result.used]).max(initial=0.0)))} at most; standard deviation of a touch "
@@ -161,7 +172,7 @@ def _text(found: FoundPart) -> str:
         *(f"  also fits: {other}" for other in result.others),
     ]
     if result.uncertainty > tolerance and found.refused is None:
-        lines.append(f"  that is more than tolerance.path_mm = {found.job.tolerance.path_mm:g}: touch more, first at")
+        lines.append(f"  that is more than {wanted}: touch more, first at")
         lines += [f"    {name}" for name in touch_names(*found.proposals)]
     return "\n".join([*lines, *placement_sentences(result.placement)])
 
@@ -172,8 +183,6 @@ def _content(found: FoundPart) -> dict[str, Any]:
 
     result = found.registration
     return {
-        "registered": found.refused is None,
-        "refusal": None if found.refused is None else str(found.refused),
         "placement_mm": matrix_mm(result.placement).tolist(),
         "residuals_um": from_si(result.residuals, "um").round(3).tolist(),
         "outlier_lines": [found.touches.lines[k] for k in result.outliers],

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.option("--placement", required=True, type=click.Path(path_type=Path), metavar="FILE",
               help="Where the part was found: a file of `pentapod register`.")  # fmt: skip
 @click.option("-o", "--out", type=click.Path(path_type=Path), help="Folder for the files; DIR/replanned when left out.")
-@click.option("--explain", is_flag=True, help="Print the nearest limits: where, and by how much.")
+@click.option("--explain", is_flag=True, help="Print what limits the speed and the pose: where, and by how much.")
 @json_option
 @quiet_option
 def replan(folder: Path, placement: Path, out: Path | None, explain: bool, as_json: bool, quiet: bool) -> int:

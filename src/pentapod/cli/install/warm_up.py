@@ -26,9 +26,13 @@ def warm_up(processes: int | None, as_json: bool, quiet: bool) -> int:
     start = time.perf_counter()
     with progress_bar(quiet=quiet or as_json) as progress:
         done, compiled = kernels.warm_up(processes, progress)
+    names = len({name for name, _ in kernels.signatures()})
     seconds = time.perf_counter() - start
     if as_json:
         echo_json({"ready": done, "compiled": compiled, "seconds": seconds})
     elif not quiet:
-        click.echo(f"{done} kernels are ready, {compiled} compiled now, {seconds:.0f} s")
+        click.echo(
+            f"{names} kernels are ready, in {done} forms for the types of their arguments; {compiled} forms compiled "
+            f"now, {seconds:.0f} s"
+        )
     return 0

@@ -9,6 +9,7 @@ from html import escape
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.report.drawings.svg_paths import ARROW, arrow_head, path_through
 
 LETTER = 11.0
 """Height of letters, in units of the drawing; a unit is a CSS pixel where the drawing is as wide as it was made."""
@@ -16,12 +17,12 @@ LETTER = 11.0
 LETTER_WIDTH = 0.65
 """Width of a letter as a share of its height, rather too much."""
 
-ARROW = 6.0
-"""Length of an arrow's head."""
-
 Box = tuple[float, float, float, float]
 Place = tuple[float, float, str]
 """Where a label may stand: x and y of its base line, and which point of it that is ("start", "middle", "end")."""
+
+_AROUND = tuple(sorted(np.ndindex(5, 5), key=lambda k: ((k[0] - 2) ** 2 + (k[1] - 2) ** 2, k)))
+"""Steps beside a point, from 2 on, the nearest first: the disc of a point goes to the first one that is free."""
 
 _HALO = "paint-order:stroke;stroke:var(--sheet,#fff);stroke-width:3px;stroke-linejoin:round"
 
@@ -50,6 +51,7 @@ class Paper:
     width: float = WIDTH
     parts: list[str] = field(default_factory=list[str])
     taken: list[Box] = field(default_factory=list[Box])
+    discs: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
 
     @property
     def height(self) -> float:
@@ -81,16 +83,16 @@ class Paper:
 
     def line(self, points: Floats, colour: str = "currentColor", width: float = 1.0, more: str = "") -> None:
         """Draw a line through points (K, 2), mm."""
-        self._path(_lines([self.at(points)]), colour, width, f'fill="none" {more}')
+        self._path(path_through([self.at(points)]), colour, width, f'fill="none" {more}')
 
     def lines(self, lines: Iterable[Floats], colour: str, width: float) -> None:
         """Draw lines (K, 2), mm, as one."""
-        if path := _lines([self.at(line) for line in lines]):
+        if path := path_through([self.at(line) for line in lines]):
             self._path(path, colour, width, 'fill="none"')
 
     def area(self, lines: Iterable[Floats], colour: str, name: str) -> None:
         """Fill what is within closed lines (K, 2), mm, holes left open, and draw its border."""
-        if path := _lines([self.at(line) for line in lines], close="Z"):
+        if path := path_through([self.at(line) for line in lines], close="Z"):
             more = f'fill="{colour}" fill-opacity="0.3" fill-rule="evenodd"'
             self._path(path, "currentColor", 1.1, more, f"<title>{escape(name)}</title>")
 
@@ -100,13 +102,43 @@ class Paper:
 
     def ball(self, point: Floats, text: str, colour: str, ink: str = "#fff") -> None:
         """Draw a disc with a number, and keep labels off it."""
+        x, y = self.at(point)
+        self._disc(x, y, text, colour, ink)
+
+    def flag(self, point: Floats, text: str, colour: str) -> None:
+        """Draw a disc with a number at a point, mm; beside it, with a line, where another disc is there already."""
         (x, y), radius = self.at(point), 0.65 * LETTER
+        free = [
+            (a, b)
+            for a, b in ((x + 2.4 * radius * (dx - 2), y + 2.4 * radius * (dy - 2)) for dx, dy in _AROUND)
+            if radius < a < self.width - radius and radius < b < self.height - radius
+            and all(np.hypot(a - c, b - d) > 2.0 * radius for c, d in self.discs)
+        ]  # fmt: skip
+        a, b = free[0] if free else (x, y)
+        if (a, b) != (x, y):
+            self.stroke(f"M{x:.1f} {y:.1f}L{a:.1f} {b:.1f}", 1.0)
+        self._disc(a, b, text, colour, "#fff")
+
+    def _disc(self, x: float, y: float, text: str, colour: str, ink: str) -> None:
+        radius = 0.65 * LETTER
+        self.discs.append((x, y))
         self.parts.append(
             f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{colour}" stroke="{ink}" stroke-width="0.8"/>'
             f'<text x="{x:.1f}" y="{y + 0.34 * LETTER:.1f}" font-size="{0.9 * LETTER:.1f}" font-weight="600" '
             f'text-anchor="middle" fill="{ink}">{escape(text)}</text>'
         )
         self.keep((x - radius, y - radius, x + radius, y + radius))
+
+    def ring(self, low: Floats, high: Floats, colour: str) -> None:
+        """Draw a circle around a region low..high (2,), mm, that is hard to see: smaller than two letters."""
+        a, b = self.at(low), self.at(high)
+        reach = 0.5 * float(np.linalg.norm(b - a))
+        if reach < 2.0 * LETTER:
+            x, y = 0.5 * (a + b)
+            self.parts.append(
+                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{reach + 5.0:.1f}" fill="none" stroke="{colour}" '
+                'stroke-width="1.4"/>'
+            )
 
     def keep(self, box: Box) -> None:
         """Keep labels off a box: left, upper, right, lower edge."""
@@ -150,6 +182,7 @@ class Paper:
             f'<path d="M{x:.1f} {y:.1f}V{y - r:.1f}A{r} {r} 0 0 1 {x + r:.1f} {y:.1f}Z'
             f'M{x:.1f} {y:.1f}V{y + r:.1f}A{r} {r} 0 0 1 {x - r:.1f} {y:.1f}Z" fill="currentColor"/>'
         )
+        self.discs.append((x, y))
         self.keep((x - r, y - r, x + r, y + r))
 
     def arrow(self, point: Floats, along: Floats, length: float, text: str) -> None:
@@ -159,7 +192,7 @@ class Paper:
             return
         (x, y), (dx, dy) = self.at(point), length * along * (1.0, -1.0)
         self.stroke(f"M{x:.1f} {y:.1f}L{x + dx:.1f} {y + dy:.1f}", 1.2)
-        self.parts.append(_head(x + dx, y + dy, dx, dy))
+        self.parts.append(arrow_head(x + dx, y + dy, dx, dy))
         ux, uy = dx / (reach * length), dy / (reach * length)
         places = [
             (x + dx + far * ux, y + dy + far * uy + 0.36 * LETTER, "middle") for far in (9.0, 16.0, 24.0)
@@ -213,11 +246,11 @@ class Paper:
         ux, uy = (dx / length, dy / length) if length > 0.0 else (1.0, 0.0)
         if length > 2.5 * ARROW:
             self.stroke(f"M{ax:.1f} {ay:.1f}L{bx:.1f} {by:.1f}")
-            self.parts += [_head(bx, by, ux, uy), _head(ax, ay, -ux, -uy)]
+            self.parts += [arrow_head(bx, by, ux, uy), arrow_head(ax, ay, -ux, -uy)]
         else:
             out = 2.0 * ARROW
             self.stroke(f"M{ax - out * ux:.1f} {ay - out * uy:.1f}L{bx + out * ux:.1f} {by + out * uy:.1f}")
-            self.parts += [_head(bx, by, -ux, -uy), _head(ax, ay, ux, uy)]
+            self.parts += [arrow_head(bx, by, -ux, -uy), arrow_head(ax, ay, ux, uy)]
 
     def _path(self, path: str, colour: str, width: float, more: str, inner: str = "") -> None:
         pen = f'stroke="{colour}" stroke-width="{width:g}" stroke-linejoin="round" stroke-linecap="round"'
@@ -253,27 +286,3 @@ def _common(a: Box, b: Box) -> float:
     """Return the area that two boxes have in common."""
     wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
     return max(wide, 0.0) * max(high, 0.0)
-
-
-def _head(x: float, y: float, dx: float, dy: float) -> str:
-    """Return an arrow's head at a place, pointing along (dx, dy)."""
-    length = max(float(np.hypot(dx, dy)), 1e-9)
-    ux, uy = ARROW * dx / length, ARROW * dy / length
-    a, b = (x - ux - 0.3 * uy, y - uy + 0.3 * ux), (x - ux + 0.3 * uy, y - uy - 0.3 * ux)
-    return f'<path d="M{x:.1f} {y:.1f}L{a[0]:.1f} {a[1]:.1f}L{b[0]:.1f} {b[1]:.1f}Z" fill="currentColor"/>'
-
-
-def _lines(lines: Sequence[Floats], close: str = "") -> str:
-    """Return an SVG path of lines (K, 2): where each begins, then the way from point to point, in tenths of a unit."""
-    texts: list[str] = []
-    for line in lines:
-        places = np.round(10.0 * line).astype(np.int64)
-        keep = np.concatenate([[True], (np.diff(places, axis=0) != 0).any(axis=1)])
-        if int(keep.sum()) < 2:
-            continue
-        places = places[keep]
-        steps = np.diff(places, axis=0) / 10.0
-        start = places[0] / 10.0
-        way = "".join(f"{dx:g} {dy:g} " if dy >= 0 else f"{dx:g}{dy:g} " for dx, dy in steps.tolist())
-        texts.append(f"M{start[0]:g} {start[1]:g}l{way.strip()}{close}")
-    return "".join(texts)

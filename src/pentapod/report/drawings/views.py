@@ -182,6 +182,7 @@ def _in_machine(run: PlannedRun, view: View, part: Outline) -> str:
     paper.area(part.areas, LIMIT_COLOUR, "part")
     paper.lines(part.lines, "currentColor", 0.5)
     _draw_machine(paper, view, bones)
+    paper.ring(part.low, part.high, LIMIT_COLOUR)
     _from_zero(paper, view, origin, "datum")
     return paper.svg(f"the machine and the part {view.title}", f"In the machine, {view.title}: {view.caption}")
 
@@ -229,10 +230,10 @@ def _part(run: PlannedRun, view: View, part: Outline, points: Sequence[TouchOff]
     paper.lines(part.lines, "currentColor", 0.6)
     if upright:
         _rest(paper, run, view, part)
-    for number, point in enumerate(points, start=1):
-        paper.ball(view.flat(point.in_machine), str(number), "#111")
     if fits:
         paper.datum(origin)
+    for number, point in enumerate(points, start=1):
+        paper.flag(view.flat(point.in_machine), str(number), "#111")
     extent = part.high - part.low
     low, high = view.coordinates(part.low), view.coordinates(part.high)
     names, lower_right = view.names, np.array([part.high[0], part.low[1]])

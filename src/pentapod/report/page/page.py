@@ -153,6 +153,7 @@ def _context(run: ReportedRun, motion: dict[str, Any] | None) -> dict[str, Any]:
     drawings, below = setup_sheet(outcome)
     return {
         "job": outcome.job,
+        "title": words.job_title(outcome.job.path),
         "machine": outcome.machine,
         "status": "refused" if outcome.refusal is not None else "passed" if outcome.passed else "failed",
         "certificates": verdict.certificates,

@@ -8,7 +8,7 @@ import numpy as np
 
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.job.build.tool import job_tool
-from pentapod.job.build.toolpath import stem_sentence
+from pentapod.job.build.toolpath import Reports, machined_share, stem_sentence
 from pentapod.job.outcome import Outcome
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.placed_path import PlacedPath
@@ -27,6 +27,8 @@ def facts(outcome: Outcome) -> list[str]:
     if mesh is not None:
         size = " × ".join(f"{value:.0f}" for value in 1e3 * np.ptp(mesh.bounds, axis=0))
         told.append(f"{outcome.job.mesh_path.name}, {size} mm")
+    if (reports := outcome.find(Reports)) is not None and (machined := machined_share(reports)) < 1.0:
+        told.append(f"{100.0 * machined:.3g} % of the surface is machined: the region of the job")
     told.append(words.tool_sentence(outcome.job.tool))
     if toolpath is not None:
         told.append(f"{len(toolpath):,} waypoints")

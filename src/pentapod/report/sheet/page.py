@@ -15,6 +15,7 @@ from pentapod.report.drawings.planned_run import PlannedRun
 from pentapod.report.drawings.touch_off import touch_off_points
 from pentapod.report.drawings.views import setup_drawings
 from pentapod.report.sheet import facts
+from pentapod.report.words import job_title
 from pentapod.toolpath.linking.partition import Piece
 
 
@@ -39,7 +40,7 @@ def sheet_html(pages: Sequence[SheetPage]) -> str:
     template, style = ((folder / name).read_text(encoding="utf-8") for name in ("sheet.html.j2", "sheet.css"))
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     shown = [_shown(page, number, len(pages)) for number, page in enumerate(pages, start=1)]
-    title = f"{pages[0].run.job.path.stem}: set-up sheet"
+    title = f"{job_title(pages[0].run.job.path)}: set-up sheet"
     return environment.from_string(template).render(style=style, pages=shown, title=title, version=__version__)
 
 
@@ -87,7 +88,7 @@ def _shown(page: SheetPage, number: int, count: int) -> dict[str, object]:
     run = page.run
     points = touch_off_points(run)
     return {
-        "job": run.job.path.stem,
+        "job": job_title(run.job.path),
         "name": page.name,
         "number": number,
         "count": count,
