@@ -80,3 +80,16 @@ def test_a_cutting_force_needs_drives_with_a_force(tmp_path) -> None:
     strong = desk("peak_force_n = 900")
     assert job_machine(job, strong).cutting_force == 30.0
     assert job_machine(job, strong).digest != strong.digest
+
+
+def test_a_bound_on_the_deflection_needs_legs_with_a_stiffness(tmp_path) -> None:
+    text = job_text().replace("[feed]\n", "[feed]\ncutting_force_n = 30\n")
+    text = text.replace("[tolerance]\n", "[tolerance]\ndeflection_mm = 0.05\n")
+    (tmp_path / "part.stl").write_bytes(dome_stl(cells=4))
+    (tmp_path / "job.toml").write_text(text, encoding="utf-8")
+    job = Job.load(tmp_path / "job.toml")
+    with pytest.raises(InputError, match=r"tolerance\.deflection_mm.*not known on this machine"):
+        job_machine(job, desk("peak_force_n = 900"))
+    elastic = read_machine(DESK.replace("min_length_mm", "stiffness_n_um = 20\nmin_length_mm"), "my.toml")
+    assert job_machine(job, elastic).cutting_force == 30.0
+    assert job_machine(job, elastic).digest == elastic.digest  # no program depends on it

@@ -17,6 +17,7 @@ _TO_SI: dict[str, Callable[[Any], Any]] = {
     "deg_mm": lambda x: np.radians(x) / 1e-3,
     "per_mm": lambda x: x * 1000.0,
     "n_um": lambda x: x * 1e6,
+    "kn": lambda x: x * 1000.0,
     **dict.fromkeys(("s", "per_s", "kg", "n", "n_s_m", "m_s2"), lambda x: x),
 }
 _FROM_SI: dict[str, Callable[[Any], Any]] = {
@@ -27,6 +28,7 @@ _FROM_SI: dict[str, Callable[[Any], Any]] = {
     "deg_mm": lambda x: np.degrees(x) * 1e-3,
     "per_mm": lambda x: x / 1000.0,
     "n_um": lambda x: x / 1e6,
+    "kn": lambda x: x / 1000.0,
 }
 _LONGEST_FIRST = sorted(_TO_SI, key=len, reverse=True)
 

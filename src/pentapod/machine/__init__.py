@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from pentapod.machine.parts import ControllerSettings as ControllerSettings
     from pentapod.machine.parts import JointLimits as JointLimits
     from pentapod.machine.parts import LegLimits as LegLimits
+    from pentapod.machine.parts import Stiffness as Stiffness
     from pentapod.machine.parts import ToolLimits as ToolLimits
     from pentapod.machine.parts import WorkVolume as WorkVolume
     from pentapod.machine.reader import shipped_machines as shipped_machines
@@ -77,7 +78,7 @@ _HOMES = {
     "machine.identification.recording": "record_of",
     "machine.leg_model": "LegModel",
     "machine.machine": "ARCHITECTURAL_LIMIT Machine load_machine read_machine",
-    "machine.parts": "Bodies ControllerSettings JointLimits LegLimits ToolLimits WorkVolume",
+    "machine.parts": "Bodies ControllerSettings JointLimits LegLimits Stiffness ToolLimits WorkVolume",
     "machine.reader": "shipped_machines",
     "machine.report.drift": "Drift drift",
     "machine.report.modes": "AssemblyPose AssemblyPoses admissible_modes",

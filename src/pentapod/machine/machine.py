@@ -24,7 +24,15 @@ from pentapod.machine.calibration.digest import digest_of
 from pentapod.machine.drives import DriveForces, Drives, Masses
 from pentapod.machine.fields import for_legs, positive
 from pentapod.machine.leg_model import LegModel
-from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
+from pentapod.machine.parts import (
+    Bodies,
+    ControllerSettings,
+    JointLimits,
+    LegLimits,
+    Stiffness,
+    ToolLimits,
+    WorkVolume,
+)
 
 if TYPE_CHECKING:
     from pentapod.machine.calibration.record import CalibrationRecord
@@ -68,6 +76,7 @@ class Machine(Value):
     masses: Masses = field(default_factory=Masses)
     drive_forces: DriveForces = field(default_factory=DriveForces)
     cutting_force: float = 0.0
+    stiffness: Stiffness = field(default_factory=Stiffness)
     tool_limits: ToolLimits = field(default_factory=ToolLimits)
     guides: ReconfigurablePentapod | None = None
     calibration: CalibrationRecord | None = None
@@ -79,7 +88,7 @@ class Machine(Value):
     def __post_init__(self) -> None:
         positive(self, "tool_length", "rapid_velocity")
         count = self.robot.n_legs
-        parts = ("legs", "joints", "drives", "drive_forces", "leg_model")
+        parts = ("legs", "joints", "drives", "drive_forces", "leg_model", "stiffness")
         each = {name: for_legs(getattr(self, name), count) for name in parts}
         set_frozen(self, **each)
         self._check_legs()
@@ -114,12 +123,12 @@ class Machine(Value):
             "base_cone": self.joints.base_cone,
             "moving_mass": self.drives.moving_mass,
             "peak_force": self.drive_forces.peak_force,
+            "leg_stiffness": self.stiffness.leg_stiffness,
         }
         for key, values in rows.items():
             if len(values) != count:
                 raise MachineError("wrong count", key=key, value=len(values), expected=f"one for each of {count} legs")
-        on_line = not self.robot.arms.any() and self.limb is None
-        if self.drive_forces.limited and not (on_line and not getattr(self.robot, "radii", np.zeros(1)).any()):
+        if self.drive_forces.limited and not self.ends_on_line:
             raise MachineError(
                 "forces of the drives are known only where all legs end on the tool's line and nothing else holds it",
                 key="peak_force",
@@ -156,6 +165,12 @@ class Machine(Value):
     def bars(self) -> Bars:
         """The legs, and the passive limb, as bodies."""
         return Bars(self.robot, self.limb, self.bodies.leg_radius)
+
+    @property
+    def ends_on_line(self) -> bool:
+        """Whether all legs end on the platform line and nothing else holds it: then the forces in them are known."""
+        beside = self.robot.arms.any() or getattr(self.robot, "radii", np.zeros(1)).any()
+        return not beside and self.limb is None
 
     @property
     def line_top(self) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
@@ -13,7 +13,7 @@ from pentapod.base.errors import MachineError
 from pentapod.base.keys import Key, check_fields
 from pentapod.base.values import Value
 from pentapod.geometry.interpolant import Interpolation
-from pentapod.machine.fields import LEG_AXES, LIST_OF_3, PER_LEG, per_leg, positive
+from pentapod.machine.fields import LEG_AXES, LIST_OF_3, PER_LEG, each_leg, per_leg, positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +80,64 @@ class JointLimits(Value):
             value = np.degrees(limits).tolist()
             raise MachineError("not a range", key="platform_range", value=value, expected="0 ≤ min < max ≤ 180 degrees")
         set_frozen(self, base_axes=frozen(axes / norms, "base_axes"))
+
+
+@dataclass(frozen=True, eq=False)
+class LegStiffness(Value):
+    """How stiff the legs are along themselves: springs in series, infinite where nothing yields. Arrays (n,), SI."""
+
+    leg_stiffness: Annotated[
+        Floats,
+        Key("n_um", "stiffness of a leg along itself, drive and bearings included", "stiffness", kind=PER_LEG),
+    ] = field(default_factory=each_leg(math.inf))
+    leg_rigidity: Annotated[
+        Floats,
+        Key(
+            "kn",
+            "E A of what gets softer with the leg's length, such as a screw: it yields like a spring of E A / length, "
+            "in series with the other",
+            "rigidity",
+            kind=PER_LEG,
+        ),
+    ] = field(default_factory=each_leg(math.inf))
+
+
+@dataclass(frozen=True, eq=False)
+class JointStiffness(Value):
+    """How stiff a leg's joints are along it, infinite where they do not yield. Array (n,), N/m."""
+
+    joint_stiffness: Annotated[
+        Floats,
+        Key(
+            "n_um",
+            "stiffness of a leg's two joints together, along the leg; in series with the leg",
+            "stiffness",
+            kind=PER_LEG,
+        ),
+    ] = field(default_factory=each_leg(math.inf))
+
+
+@dataclass(frozen=True, eq=False)
+class Stiffness(JointStiffness, LegStiffness):
+    """Springs of legs and joints, in series along each leg. Base and platform are rigid.
+
+    Arrays (n,), where scalars hold for all legs; infinite where nothing is given. Raises MachineError: not positive.
+    """
+
+    def __post_init__(self) -> None:
+        per_leg(self, *self.__dataclass_fields__, finite=False)
+        for name, values in vars(self).items():
+            if not (values > 0.0).all():
+                raise MachineError("must be positive", key=name, value=values.tolist())
+
+    @property
+    def given(self) -> bool:
+        """Whether anything yields."""
+        return any(bool(np.isfinite(values).any()) for values in vars(self).values())
+
+    def yielding(self, lengths: Floats) -> Floats:
+        """Return how far legs of these lengths (..., n), metres, get shorter by 1 N, m/N."""
+        return 1.0 / self.leg_stiffness + 1.0 / self.joint_stiffness + lengths / self.leg_rigidity
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,17 @@ from pentapod.kinematics.robot import Robot
 from pentapod.machine.drives import DriveForces, Drives, Masses
 from pentapod.machine.families import FAMILIES, legs_of
 from pentapod.machine.leg_model import LegModel
-from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
+from pentapod.machine.parts import (
+    Bodies,
+    ControllerSettings,
+    JointLimits,
+    JointStiffness,
+    LegLimits,
+    LegStiffness,
+    Stiffness,
+    ToolLimits,
+    WorkVolume,
+)
 from pentapod.machine.tables import FILE_KEYS, GuideKeys, MachineTables, MachineToolKeys, PlatformJointKeys
 
 if TYPE_CHECKING:
@@ -128,6 +138,7 @@ def _fields(tables: Any, file: str | Path) -> dict[str, Any]:
             platform_range=np.stack([platform["platform_min"], platform["platform_max"]], axis=1),
             **fields_from(JointLimits, tables.joints),
         ),
+        "stiffness": Stiffness(**fields_from(LegStiffness, tables.legs), **fields_from(JointStiffness, tables.joints)),
         "bodies": Bodies(**fields_from(Bodies, tables.bodies)),
         "controller": ControllerSettings(**fields_from(ControllerSettings, tables.controller)),
         "work": WorkVolume(**fields_from(WorkVolume, tables.work)),

@@ -15,7 +15,16 @@ from pentapod.machine.drives import DriveForces, Drives, Masses
 from pentapod.machine.families import OfFamily
 from pentapod.machine.fields import LEG_PAIRS, PER_LEG, each_leg
 from pentapod.machine.leg_model import LegModel
-from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
+from pentapod.machine.parts import (
+    Bodies,
+    ControllerSettings,
+    JointLimits,
+    JointStiffness,
+    LegLimits,
+    LegStiffness,
+    ToolLimits,
+    WorkVolume,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +75,9 @@ class CalibrationKeys:
 PARTS: dict[str, tuple[type, ...]] = {
     "calibration": (CalibrationKeys,),
     "guides": (GuideKeys,),
-    "legs": (LegLimits,),
+    "legs": (LegLimits, LegStiffness),
     "leg_model": (LegModel,),
-    "joints": (JointLimits, PlatformJointKeys),
+    "joints": (JointLimits, PlatformJointKeys, JointStiffness),
     "bodies": (Bodies,),
     "tool": (MachineToolKeys, ToolLimits),
     "controller": (ControllerSettings,),

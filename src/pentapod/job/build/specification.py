@@ -52,6 +52,7 @@ def job_specification(
         cutting=cutting,
         constraints=constraints,
         component=None if component is None else Component.parse(component),
+        deflection=job.tolerance.si.deflection,
         lowest_share=job.feed.lowest_share,
         stop_angle=job.feed.si.stop_angle,
         setups=job.placement.setups,

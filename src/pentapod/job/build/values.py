@@ -43,10 +43,15 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
     length = machine.tool_length if job.tool.length_mm is None else job.tool.si.length
     limits = machine.tool_limits.and_(ToolLimits(**fields_from(ToolLimits, job.feed)))
     cutting = job.feed.si.cutting_force
-    if cutting > 0.0 and not machine.drive_forces.limited:
-        remedy = "give peak_force_n in [drives] of the machine file, or leave the cutting force out"
-        what = "the machine says nothing of the force of its drives"
+    if cutting > 0.0 and not (machine.drive_forces.limited or machine.stiffness.given):
+        remedy = "give peak_force_n in [drives] or stiffness_n_um in [legs] of the machine file, or leave the force out"
+        what = "the machine says nothing of the force of its drives, nor of its stiffness"
         raise job.error("feed", "cutting_force_n", what, value=cutting, remedy=remedy)
+    deflection = job.tolerance.deflection_mm
+    if deflection is not None and not (machine.stiffness.given and machine.ends_on_line):
+        remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
+        what = "how far the tip deflects is not known on this machine"
+        raise job.error("tolerance", "deflection_mm", what, value=deflection, remedy=remedy)
     try:
         return dataclasses.replace(
             machine, controller=controller, tool_length=length, tool_limits=limits, cutting_force=cutting

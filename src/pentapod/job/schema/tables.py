@@ -99,7 +99,12 @@ class FeedKeys:
     ] = None
     cutting_force: Annotated[
         float,
-        Key("n", "force on the tip, in any direction, that drives with a peak force keep free for cutting", ge=0.0),
+        Key(
+            "n",
+            "force on the tip, in any direction, that drives with a peak force keep free for cutting; "
+            "the tip deflects by it",
+            ge=0.0,
+        ),
     ] = 0.0
     lowest_share: Annotated[
         float | None,
@@ -139,6 +144,15 @@ class ToleranceKeys:
     axis: Annotated[
         float, Key("deg", "largest angle by which the axis may leave the tilt cone between waypoints", gt=0.0, le=10.0)
     ] = to_si(0.5, "deg")
+    deflection: Annotated[
+        float | None,
+        Key(
+            "mm",
+            "largest deflection of the tip by weight, acceleration and cutting force, of machines that give the "
+            "stiffness of their legs; told without a bound when left out",
+            gt=0.0,
+        ),
+    ] = None
     left: Annotated[
         float | None,
         Key(

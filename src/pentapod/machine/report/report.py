@@ -19,6 +19,7 @@ from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.leg_clearance import clearances, pair_names
 from pentapod.machine.machine import ARCHITECTURAL_LIMIT, Machine
 from pentapod.machine.report.drives import DriveReport
+from pentapod.machine.report.softness import Softness
 from pentapod.machine.work_volume import sample_work_volume
 
 AMPLIFICATION_LIMIT = 10.0
@@ -61,6 +62,7 @@ class MachineReport(Value):
     radians by its unit; least_turn: radians of turning about the tip to any singularity, None where no closed form
     gives it; amplification: force of the legs by force at the tip; clearance, metres, and its pair of bodies. branch:
     the one in which all poses lie, or None. drives: what they can do, where the machine limits their forces.
+    softness: where the tip yields most, where the machine gives the stiffness of its legs.
     """
 
     machine: Machine
@@ -76,6 +78,7 @@ class MachineReport(Value):
     branch: Branch | None
     findings: tuple[MachineFinding, ...]
     drives: DriveReport | None = None
+    softness: Softness | None = None
 
     @property
     def passed(self) -> bool:
@@ -150,6 +153,7 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = L
             *_of_rails(machine),
         ),
         drives=DriveReport.of(machine, position, direction, where) if machine.drive_forces.limited else None,
+        softness=Softness.of(machine, position, direction, where) if machine.stiffness.given else None,
     )
 
 
@@ -249,6 +253,7 @@ def explain(report: MachineReport) -> str:
         f"  smallest clearance                    {1e3 * report.clearance:.1f} mm ({report.clearance_pair})",
         f"  architectural measure                 {m.architecture:.4f}",
         *(f"  {found.name:<35}   {found.value:.2f}" for found in _of_rails(m)),
+        *([] if report.softness is None else report.softness.lines()),
         *([] if report.drives is None else report.drives.lines(m)),
         "",
     ]

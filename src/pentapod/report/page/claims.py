@@ -19,7 +19,7 @@ KINDS = (
 
 _BY_BEGINNING = (
     (0, ("tip deviation", "axis deviation", "toolpath covered", "starts at the toolpath", "ends at the toolpath")),
-    (0, ("every cut",)),
+    (0, ("every cut", "deflection")),
     (1, ("gouge", "surface left")),
     (2, ("clearance",)),
     (3, ("leg", "continuous leg", "base joint", "platform joint", "passive limb", "component kept", "guides")),

@@ -14,6 +14,7 @@ from pentapod.base.values import Value
 from pentapod.geometry.interpolant import clamped_slopes
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.machine.dynamics.deflection import Yielding, leg_pushes
 from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
 from pentapod.program.program import Program
@@ -22,7 +23,7 @@ from pentapod.verify.replay.free_space import PosedPolyline
 from pentapod.verify.replay.interval_bounds import IntervalBounds, interval_bounds
 from pentapod.verify.replay.path_matching import OPTIONS as MATCHING
 from pentapod.verify.replay.path_matching import PathMatch, match
-from pentapod.verify.replay.row_forces import RowForces
+from pentapod.verify.replay.row_forces import RowForces, motion_of_rows
 from pentapod.verify.verdict.specification import Specification
 from pentapod.verify.verdict.verdict import Place
 
@@ -130,10 +131,20 @@ class Replay(Value):
         """Forces of the drives at the rows, of a machine that limits them. Needs a pose at every row."""
         position, direction = (pose[::2] for pose in self.pose)
         program = self.program
-        cuts = self._cuts() if self.machine.cutting_force else np.zeros(len(program.legs), dtype=np.bool_)
+        cuts = self.cuts() if self.machine.cutting_force else np.zeros(len(program.legs), dtype=np.bool_)
         return RowForces.of(program, self.machine, self.slopes, (position, direction), cuts)
 
-    def _cuts(self) -> Bools:
+    @cached_property
+    def yielding(self) -> Yielding:
+        """How far the tip moves at the rows because the legs yield to masses. Needs a pose at every row."""
+        (position, direction), found = (pose[::2] for pose in self.pose), list[Yielding]()
+        for part, rates, accelerations in motion_of_rows(self.program, self.slopes):
+            poses = position[part], direction[part]
+            push = leg_pushes(self.machine, *poses, rates, accelerations)
+            found.append(Yielding.of(self.machine, *poses, push))
+        return Yielding(*(np.concatenate([getattr(each, name) for each in found]) for name in vars(found[0])))
+
+    def cuts(self) -> Bools:
         """Return the rows (N,) on a cut and farther than the path tolerance from its ends."""
         arcs, ends = self.match.arcs[::2], arc_length(self.toolpath.tilt_centres)[self.toolpath.starts]
         first = np.searchsorted(ends, arcs - self.match_radius, side="right")

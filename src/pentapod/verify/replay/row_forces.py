@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -16,6 +17,22 @@ from pentapod.program.program import Program
 
 ROWS_AT_ONCE = 1 << 15
 """Rows that are computed together, so that memory grows by no more than four numbers a leg and row."""
+
+
+def motion_of_rows(program: Program, slopes: Floats | None) -> Iterator[tuple[slice, Floats, Floats]]:
+    """Yield slices of a program's rows with the rates and accelerations (N, n_legs) of the legs there, m/s and m/s².
+
+    slopes: of the spline, as `Interpolant.along`.
+    """
+    last = len(program.legs) - 1
+    for part in blocks(last + 1, ROWS_AT_ONCE):
+        low, high = max(part.start - 1, 0), min(part.stop, last)  # one row more on each side
+        near, own = slice(low, high + 1), slice(part.start - low, part.stop - low)
+        legs = Interpolant.along(program.legs[near], None if slopes is None else slopes[near], program.period)
+        rates = legs.first
+        if slopes is None:  # the rate jumps at the row: the mean of both sides
+            rates = 0.5 * (rates + np.append(rates[1:], np.zeros_like(rates[:1]), axis=0))
+        yield part, rates[own], legs.second[own]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,16 +58,9 @@ class RowForces(Value):
 
         cuts (N,): the rows that cut.
         """
-        found, last = cls(*(np.empty(program.legs.shape) for _ in fields(cls))), len(program.legs) - 1
-        for part in blocks(last + 1, ROWS_AT_ONCE):
-            low, high = max(part.start - 1, 0), min(part.stop, last)  # one row more on each side
-            near, own = slice(low, high + 1), slice(part.start - low, part.stop - low)
-            legs = Interpolant.along(program.legs[near], None if slopes is None else slopes[near], program.period)
-            rates = legs.first
-            if slopes is None:  # the rate jumps at the row: the mean of both sides
-                rates = 0.5 * (rates + np.append(rates[1:], np.zeros_like(rates[:1]), axis=0))
-            poses_there = poses[0][part], poses[1][part]
-            here = cls.at(machine, poses_there, rates[own], legs.second[own], cuts[part])
+        found = cls(*(np.empty(program.legs.shape) for _ in fields(cls)))
+        for part, rates, accelerations in motion_of_rows(program, slopes):
+            here = cls.at(machine, (poses[0][part], poses[1][part]), rates, accelerations, cuts[part])
             for item in fields(cls):
                 getattr(found, item.name)[part] = getattr(here, item.name)
         return found

@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 class Specification(Value):
     """What a program is judged against. A field that is None is not given: claims that need it are not judged.
 
-    machine: with its tool length and controller. toolpath: in the workpiece frame, as the job asks for it.
-    tilt: half angle in radians of the cone about the nominal axis in which the tool may tilt; axis_tolerance:
-    radians beyond that; path_tolerance: metres. job_digest: of the job that the header must name. collision_world: what
-    legs, spindle and tool must not touch. cutting: what cuts, and into which part. constraints: the allowed placements.
-    component: in which the program must be; None where any is allowed. lowest_share: of the feed, that cuts and links
-    must reach where no limit is used; None for the default of the tool, 0 for no lowest feed. stop_angle: radians;
-    where the toolpath turns by more the program may stop, as it may from 20 degrees on. setups: largest number of
-    programs into which the job may be split; missed: number of intervals of the whole toolpath that are cut in none of
-    them, or in more than one; None where the others are not known. waived: names of claims without which the verdict
-    may pass where they cannot be judged. sources: its files.
+    machine: with its tool length and controller. toolpath: in the workpiece frame, as the job asks for it. tilt: half
+    angle in radians of the cone about the nominal axis in which the tool may tilt; axis_tolerance: radians beyond that;
+    path_tolerance: metres. job_digest: of the job that the header must name. collision_world: what legs, spindle and
+    tool must not touch. cutting: what cuts, and into which part. constraints: the allowed placements. component: in
+    which the program must be; None where any is allowed. deflection: largest of the tip, metres; None where it is only
+    told. lowest_share: of the feed, that cuts and links must reach where no limit is used; None for the default of the
+    tool, 0 for no lowest feed. stop_angle: radians; where the toolpath turns by more the program may stop, as it may
+    from 20 degrees on. setups: largest number of programs into which the job may be split; missed: number of intervals
+    of the whole toolpath that are cut in none of them, or in more than one; None where the others are not known.
+    waived: names of claims without which the verdict may pass where they cannot be judged. sources: its files.
     Raises ArrayError where a tolerance is not a positive number.
     """
 
@@ -47,6 +47,7 @@ class Specification(Value):
     cutting: Cutting | None = None
     constraints: PlacementConstraints | None = None
     component: Component | None = None
+    deflection: float | None = None
     lowest_share: float | None = None
     stop_angle: float | None = None
     setups: int = 1
@@ -59,6 +60,8 @@ class Specification(Value):
             value = getattr(self, name)
             if not (np.isfinite(value) and (value >= 0.0 if name != "path_tolerance" else value > 0.0)):
                 raise ArrayError("must be a positive number", key=name, value=value)
+        if self.deflection is not None and not self.deflection > 0.0:
+            raise ArrayError("must be a positive number", key="deflection", value=self.deflection)
         if self.lowest_share is not None and not 0.0 <= self.lowest_share <= 1.0:
             raise ArrayError("must be a share", key="lowest_share", value=self.lowest_share, expected="0 to 1")
         if self.stop_angle is not None and not 0.0 < self.stop_angle <= np.pi:
@@ -76,6 +79,7 @@ class Asked(TypedDict, total=False):
     cutting: Cutting | None
     constraints: PlacementConstraints | None
     component: Component | None
+    deflection: float | None
     lowest_share: float | None
     stop_angle: float | None
     setups: int

@@ -1,0 +1,53 @@
+"""Deflection: how far the tip moves because legs and joints yield along the legs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pentapod.base.arrays import Floats
+from pentapod.base.values import Value
+from pentapod.kinematics.forces import leg_force_map
+from pentapod.machine.dynamics.dynamics import Dynamics
+from pentapod.machine.machine import Machine
+
+
+@dataclass(frozen=True, eq=False)
+class Yielding(Value):
+    """How far the tip moves in N poses, to first order, passive limbs rigid; infinite on a singularity.
+
+    shift (N, 3): by the legs' forces, metres, machine frame. softest (N,): by 1 N on the tip in the direction in which
+    it yields most, m/N; ways (N, 3): that direction, of either sign.
+    """
+
+    shift: Floats
+    softest: Floats
+    ways: Floats
+
+    @classmethod
+    def of(cls, machine: Machine, position: Floats, direction: Floats, push: Floats | None = None) -> Yielding:
+        """Return it for poses (N, 3). push (N, n_legs): forces of the legs on the platform, newtons; None for none."""
+        loads = leg_force_map(machine.robot, position, direction, machine.tool_length)
+        firm = np.asarray(np.isfinite(loads).all(axis=(-1, -2)), dtype=np.bool_)
+        loads = np.where(firm[:, None, None], loads, 0.0)
+        lengths = np.linalg.norm(machine.robot.leg_vectors(position, direction), axis=-1)
+        by_newton = machine.stiffness.yielding(lengths)
+        turned = np.swapaxes(loads, -1, -2)
+        most, ways = np.linalg.eigh(turned @ (by_newton[..., None] * loads))
+        # A leg that pushes gets shorter. Virtual work: shift = -loads^T (change of length).
+        shorter = np.zeros_like(by_newton) if push is None else by_newton * push
+        shift = np.einsum("nac,nc->na", turned, shorter)
+        return cls(
+            np.where(firm[:, None], shift, np.inf), np.where(firm, np.maximum(most[:, -1], 0.0), np.inf), ways[..., -1]
+        )
+
+
+def leg_pushes(machine: Machine, position: Floats, direction: Floats, rates: Floats, accelerations: Floats) -> Floats:
+    """Return the forces (N, n_legs) with which legs hold and move platform and rods, newtons; a push is positive.
+
+    rates, accelerations: of the legs, m/s and m/s². What a drive needs to move itself is not in it: that does not go
+    through the leg. No friction.
+    """
+    terms = Dynamics.of(machine).of_rows(position, direction, rates, accelerations, reach=False)
+    return terms.quadratic + terms.weight - machine.drives.moving_mass * accelerations
