@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from pentapod.base.errors import JobError
+from pentapod.base.progress import silent
 from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.cli.main import run as run_cli
 from pentapod.job import AdviceOptions, Job, advise, run
@@ -80,10 +81,10 @@ def test_no_search_where_none_is_wanted(make_job, tmp_path):
     assert "advice" not in {stage.name for stage in outcome.stages}
 
 
-def searched(folder, name, planned, **options) -> Advised:
+def searched(folder, name, planned, progress=silent, **options) -> Advised:
     job = Job.load(REFUSED[name].write(folder))
     given = (job, job_machine(job), job_mesh(job), None, planned, AdviceOptions(**options))
-    return advised(*given, lambda *_: None)
+    return advised(*given, progress)
 
 
 def test_the_best_that_passes_comes_first_and_what_fails_is_no_advice(tmp_path):
@@ -143,6 +144,27 @@ def test_a_program_that_fails_is_not_split_into_setups(stage, split, tmp_path, m
     assert [each.axis.mode for each in planned[:2]] == ["fixed", "auto"]
     assert {(each.part.region_box_mm, each.placement.setups) for each in planned[:2]} == {(None, 1)}
     assert any(each.placement.setups > 1 for each in planned) == split
+
+
+def test_the_share_of_a_search_that_is_done_never_falls(tmp_path):
+    """The time that is left is told from it; the plans end at the shares that they were given."""
+
+    def plan(_, progress) -> str:
+        for stage in ("mesh", "toolpath", "placement", "timing", "verify"):
+            for fraction in (0.0, 0.5, 1.0):
+                progress(stage, fraction)
+        ends.append(shares[-1][0])
+        return "verify"
+
+    ends: list[float] = []
+    shares: list[tuple[float, str]] = []
+    tell = lambda _, share, note: shares.append((share, note))  # noqa: E731
+    searched(tmp_path, "table too low", plan, progress=tell, plans=3, wanted=3)
+    done = [share for share, _ in shares]
+    assert done == sorted(done)
+    assert ends == pytest.approx([1 / 3, 2 / 3, 1.0][: len(ends)])
+    assert len(ends) >= 2
+    assert any("plan 2 of at most 3: " in note and note.endswith(": timing") for _, note in shares)
 
 
 def test_an_interruption_ends_the_search_and_keeps_what_was_found(tmp_path):

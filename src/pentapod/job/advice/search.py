@@ -25,6 +25,13 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify.verdict.verdict import Certificate
 
+ESTIMATES = 0.3
+"""Share of the time of a plan, with the estimates before it, that these take; for the progress alone."""
+
+STAGES = {"toolpath": (0.0, 0.3), "placement": (0.3, 0.6), "tool axis": (0.3, 0.6), "leg path": (0.6, 0.65),
+          "timing": (0.65, 0.8), "verify": (0.8, 1.0)}  # fmt: skip
+"""Where in a plan its stages begin and end, as shares of its time; for the progress alone."""
+
 Planned = Callable[[Job, Progress], str | None]
 """Plans a job, all stages, and returns the stage that refused it; None where its verdict passed.
 
@@ -78,11 +85,12 @@ def advised(
     reasons: dict[str, None] = {}
     count, interrupted = options.replans if failed else options.plans, False
     ended: list[str | None] = [None]
+    shown = _Shown(progress, count)
 
     def tell(words: str) -> None:
         if words:
             tried[words] = None
-            progress("advice", 0.0, words)
+            shown.estimate(words)
 
     about = (lambda words: reasons.update({words: None}), lambda: ended[-1], toolpath is not None and not short)
     trials = _trials(job, machine, mesh, toolpath, options, tell, *about)
@@ -93,7 +101,8 @@ def advised(
     try:
         for number, trial in enumerate(islice(trials, count)):
             tried[trial.words] = None
-            ended.append(_ended(planned, job, trial, partial(_told, progress, (number + 0.5) / count, trial.words)))
+            ended.append(_ended(planned, job, trial, partial(shown.plan, number, trial.words)))
+            shown.number = number + 1
             if ended[-1] is None:
                 changes = (Change(table, *item) for table, keys in trial.changes.items() for item in keys.items())
                 found.append(Advice(tuple(changes), trial.words, trial.kept, trial.whole))
@@ -105,9 +114,36 @@ def advised(
     return Advised(tuple(found), tuple(tried), interrupted, tuple(reasons))
 
 
-def _told(progress: Progress, share: float, words: str, stage: str, fraction: float, note: str = "") -> None:
-    """Report a stage of a trial as a report of the search."""
-    progress("advice", share, f"planning: {words}: {stage}")
+@dataclass
+class _Shown:
+    """The progress of a search of at most `count` plans, whose share never falls: the time left is told from it.
+
+    number: of the plan that is estimated or made. estimates: so far, for that plan.
+    """
+
+    progress: Progress
+    count: int
+    number: int = 0
+    estimates: int = 0
+    reached: float = 0.0
+
+    def estimate(self, words: str) -> None:
+        """Report an estimate; how many are made for a plan is not known before."""
+        self.estimates += 1
+        self._tell(ESTIMATES * (1.0 - 0.85**self.estimates), words)
+
+    def plan(self, number: int, words: str, stage: str, fraction: float, note: str = "") -> None:
+        """Report a stage of a plan as a part of the search."""
+        self.number, self.estimates = number, 0
+        begins, ends = STAGES.get(stage, (0.0, 0.0))
+        share = begins + (ends - begins) * fraction
+        self._tell(
+            ESTIMATES + (1.0 - ESTIMATES) * share, f"plan {number + 1} of at most {self.count}: {words}: {stage}"
+        )
+
+    def _tell(self, share: float, words: str) -> None:
+        self.reached = max(self.reached, (self.number + share) / self.count)
+        self.progress("advice", self.reached, words)
 
 
 def _ended(planned: Planned, job: Job, trial: Trial, progress: Progress) -> str | None:
