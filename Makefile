@@ -112,8 +112,8 @@ reference: $(READY)  ## the pages of docs/reference, from the code
 
 pictures: $(READY)  ## the screenshots of the documentation, from the tests that open a browser
 	mkdir -p out/shots
-	PENTAPOD_SHOTS=out/shots $(BIN)/pytest tests/report/test_report_in_browser.py tests/report/test_sheet_in_browser.py tests/view/test_viewer_in_browser.py -k "drawn or draws or prints"
-	cp out/shots/report.png out/shots/report-first.png out/shots/sheet.png out/shots/view.png docs/
+	PENTAPOD_SHOTS=out/shots $(BIN)/pytest tests/report/test_report_in_browser.py tests/report/test_sheet_in_browser.py tests/view/test_viewer_in_browser.py -k "drawn or draws or prints or telephone"
+	cp out/shots/report*.png out/shots/sheet.png out/shots/view.png docs/
 
 site: $(READY)  ## the documentation as a site, in site/
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict

@@ -74,7 +74,8 @@ def report(tmp_path_factory):
     from pentapod.cli.commands.new import dome_stl
     from usual_job import job_text
 
-    folder = tmp_path_factory.mktemp("report")
+    folder = tmp_path_factory.mktemp("report") / "dome"
+    folder.mkdir()
     (folder / "part.stl").write_bytes(dome_stl(cells=12))
     (folder / "job.toml").write_text(job_text(), encoding="utf-8")
     outcome = run(Job.load(folder / "job.toml"), folder / "out")
@@ -103,9 +104,8 @@ class Opened:
 def opened(request, chromium, report):
     page = Opened(chromium, report[0], request.param)
     if shots := os.environ.get("PENTAPOD_SHOTS"):
-        page.page.screenshot(path=Path(shots) / f"report-{request.param}.png", full_page=True)
+        page.page.screenshot(path=Path(shots) / f"report-{request.param}.png")
         if request.param == "light":
-            page.page.screenshot(path=Path(shots) / "report-first.png")
             page.page.locator("#motion").screenshot(path=Path(shots) / "report.png")
     yield page
     page.page.close()
@@ -281,18 +281,18 @@ def test_report_prints_on_four_pages_of_a4(chromium, report, tmp_path):
     assert wide == 0
     if shots := os.environ.get("PENTAPOD_SHOTS"):
         (Path(shots) / "report.pdf").write_bytes(pdf)
-        opened.page.screenshot(path=Path(shots) / "report-paper.png", full_page=True)
+        opened.page.screenshot(path=Path(shots) / "report-paper.png")
     opened.page.close()
 
 
 def test_a_telephone_shows_the_report_without_scrolling_sideways(chromium, report):
     narrow = Opened(chromium, report[0], width=390)
+    if shots := os.environ.get("PENTAPOD_SHOTS"):
+        narrow.page.screenshot(path=Path(shots) / "report-390.png")
     assert narrow.page.evaluate("document.documentElement.scrollWidth") <= 390
     for details in narrow.page.locator("summary:visible").all():
         details.click()
     assert narrow.page.evaluate("document.documentElement.scrollWidth") <= 390
-    if shots := os.environ.get("PENTAPOD_SHOTS"):
-        narrow.page.screenshot(path=Path(shots) / "report-390.png")
     narrow.page.close()
 
 

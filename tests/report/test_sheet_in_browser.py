@@ -49,7 +49,8 @@ def chromium():
 @pytest.fixture(scope="module")
 def sheets(tmp_path_factory):
     """Two sheets of the small job: of one page, and of two as of a job in two set-ups, with a tilted part."""
-    folder = tmp_path_factory.mktemp("sheet")
+    folder = tmp_path_factory.mktemp("sheet") / "dome"
+    folder.mkdir()
     (folder / "part.stl").write_bytes(dome_stl(cells=12))
     text = job_text().replace("rotation_deg = [180, 0, 0]", "rotation_deg = [171, 4, 30]")
     (folder / "job.toml").write_text(text.replace("diameter_mm = 10", "diameter_mm = 10\nshank_mm = [[30, 8, 10]]"))
