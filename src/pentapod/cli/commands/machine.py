@@ -105,6 +105,32 @@ def linuxcnc(name_or_file: str, out: Path, as_json: bool, quiet: bool) -> int:
     return 0
 
 
+@machine.command("structured-text")
+@click.argument("name_or_file")
+@click.option("-o", "--out", type=click.Path(path_type=Path), required=True, help="File to write, such as desk.st.")
+@json_option
+@quiet_option
+def structured_text_of(name_or_file: str, out: Path, as_json: bool, quiet: bool) -> int:
+    """Write the kinematics of a machine (NAME or FILE.toml) as Structured Text, for CODESYS and TwinCAT.
+
+    A function block with the methods CartesianToAxes and AxesToCartesian, and the margin of each limit. For the
+    quadratic family, as designed or as measured.
+    """
+    from pentapod.base.files import atomic_write
+    from pentapod.machine import Machine
+    from pentapod.program.posts.codesys.structured_text import structured_text
+
+    made = Machine.load(name_or_file)
+    text = structured_text(made)
+    with atomic_write(out) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    if as_json:
+        echo_json({"machine": made.name, "digest": made.digest, "file": str(out)})
+    elif not quiet:
+        click.echo(f"{out}: function block PentapodKinematics of {made.name}")
+    return 0
+
+
 @machine.command("drift")
 @click.argument("first", type=click.Path(path_type=Path))
 @click.argument("second", type=click.Path(path_type=Path))

@@ -80,12 +80,16 @@ class Module:
 
 def module_files(given: Module) -> dict[str, bytes]:
     """Return the files of the module by name. Raises MachineError where the machine can have none."""
-    machine = given.machine
-    words = {**_identity(given), **_design(given), **_as_it_is(machine), **_limits(machine), **_pairs(given)}
-    words |= {"LEAST": _numbers([getattr(LEAST, item.name) for item in fields(LEAST)])}
-    words |= {item.name.upper(): _numbers(getattr(GUARD, item.name)) for item in fields(GUARD)}
-    words |= {"ACCELERATION": _numbers(given.accelerations)}
-    return {name: _filled(packaged(f"kinematics/{name}").decode(), words).encode() for name in SOURCES}
+    values: dict[str, ArrayLike] = {**module_values(given), "ACCELERATION": given.accelerations}
+    values |= {item.name.upper(): getattr(GUARD, item.name) for item in fields(GUARD)}
+    words = {**module_names(given), **{name: _numbers(value) for name, value in values.items()}}
+    return {name: filled(packaged(f"kinematics/{name}").decode(), words).encode() for name in SOURCES}
+
+
+def module_values(given: Module) -> dict[str, ArrayLike]:
+    """Return the numbers of the mathematics by name, mm. Raises MachineError where the machine can have no module."""
+    least = [getattr(LEAST, item.name) for item in fields(LEAST)]
+    return {**_design(given), **_as_it_is(given.machine), **_limits(given.machine), **_pairs(given), "LEAST": least}
 
 
 def nominal_robot(machine: Machine) -> LinearPentapod:
@@ -106,14 +110,19 @@ def nominal_robot(machine: Machine) -> LinearPentapod:
     return nominal
 
 
-def _identity(given: Module) -> dict[str, str]:
+def module_names(given: Module) -> dict[str, str]:
+    """Return what the sources say of machine and version, as text."""
     machine, component = given.machine, _component(given)
-    name = "".join(letter for letter in machine.name if letter.isprintable()).replace("*/", "").replace("@", "")
+    name = (
+        "".join(letter for letter in machine.name if letter.isprintable())
+        .replace("*/", "")
+        .replace("*)", "")
+        .replace("@", "")
+    )
     return {
         "NAME": name.replace("\\", ""), "DIGEST": machine.digest, "COMPONENT": str(component), "VERSION": __version__,
         "DIGEST_HIGH": machine.digest[:8], "DIGEST_LOW": machine.digest[8:],
-        "TOOL_LENGTH": _numbers(1e3 * machine.tool_length),
-        "TURN": _numbers(np.diag(given.frame.rotation)), "SHIFT": _numbers(1e3 * given.frame.translation),
+        "AS_BUILT": str(int(isinstance(machine.robot, AsBuiltPentapod))),
     }  # fmt: skip
 
 
@@ -121,46 +130,47 @@ def _component(given: Module) -> Component:
     return Component(*own_branch(nominal_robot(given.machine), given.component))
 
 
-def _design(given: Module) -> dict[str, str]:
+def _design(given: Module) -> dict[str, ArrayLike]:
     nominal, component = nominal_robot(given.machine), _component(given)
     # In millimetres from the start: exact numbers of this geometry, rounded once.
     base = 1e3 * nominal.base
     linear = LinearPart.of(base, nominal.delta)
     return {
-        "X3": _numbers(base[2, 0]), "Y3": _numbers(base[2, 1]), "Z3": _numbers(1e3 * nominal.offsets[2]),
-        "DELTA": _numbers(nominal.delta), "SIGN_W": _numbers(component.w), "SIGN_S": _numbers(component.s),
-        "LINEAR": _numbers(np.column_stack([linear.linear_map, linear.constant])),
+        "TOOL_LENGTH": 1e3 * given.machine.tool_length, "TURN": np.diag(given.frame.rotation),
+        "SHIFT": 1e3 * given.frame.translation, "X3": base[2, 0], "Y3": base[2, 1], "Z3": 1e3 * nominal.offsets[2],
+        "DELTA": nominal.delta, "SIGN_W": component.w, "SIGN_S": component.s,
+        "LINEAR": np.column_stack([linear.linear_map, linear.constant]),
     }  # fmt: skip
 
 
-def _as_it_is(machine: Machine) -> dict[str, str]:
+def _as_it_is(machine: Machine) -> dict[str, ArrayLike]:
     robot = machine.robot if isinstance(machine.robot, AsBuiltPentapod) else nominal_robot(machine)
     return {
-        "AS_BUILT": str(int(isinstance(robot, AsBuiltPentapod))), "BASE": _numbers(1e3 * robot.base_joints.T),
-        "OFFSET": _numbers(1e3 * robot.offsets), "RING": _numbers(1e3 * robot.radii),
-        "ZERO": _numbers(1e3 * robot.zeros),
+        "BASE": 1e3 * robot.base_joints.T,
+        "OFFSET": 1e3 * robot.offsets, "RING": 1e3 * robot.radii,
+        "ZERO": 1e3 * robot.zeros,
     }  # fmt: skip
 
 
-def _limits(machine: Machine) -> dict[str, str]:
+def _limits(machine: Machine) -> dict[str, ArrayLike]:
     legs, joints, bodies = machine.legs, machine.joints, machine.bodies
     return {
-        "SHORTEST": _numbers(1e3 * legs.min_length), "LONGEST": _numbers(1e3 * legs.max_length),
-        "RATE": _numbers(1e3 * legs.max_velocity), "CONE_AXIS": _numbers(joints.base_axes.T),
-        "CONE_COSINE": _numbers(np.cos(joints.base_cone)), "LEG_DIAMETER": _numbers(2e3 * bodies.leg_radius),
-        "SHAFT_AND_LEG": _numbers(1e3 * (bodies.shaft_radius + bodies.leg_radius)),
-        "JOINED": _numbers(1e3 * bodies.joint_radius), "SHAFT": _numbers(1e3 * np.array(spindle_ends(machine))),
+        "SHORTEST": 1e3 * legs.min_length, "LONGEST": 1e3 * legs.max_length,
+        "RATE": 1e3 * legs.max_velocity, "CONE_AXIS": joints.base_axes.T,
+        "CONE_COSINE": np.cos(joints.base_cone), "LEG_DIAMETER": 2e3 * bodies.leg_radius,
+        "SHAFT_AND_LEG": 1e3 * (bodies.shaft_radius + bodies.leg_radius),
+        "JOINED": 1e3 * bodies.joint_radius, "SHAFT": 1e3 * np.array(spindle_ends(machine)),
     }  # fmt: skip
 
 
-def _pairs(given: Module) -> dict[str, str]:
+def _pairs(given: Module) -> dict[str, ArrayLike]:
     scene = Scene(given.machine, own_branch(given.machine.robot, given.component))
     pairs, base = LegPairClearance.of(scene), 1e3 * given.machine.robot.base_joints
     ends = PlatformJointAngle.of(scene)
     edges = [[limit.edge for limit in ends if limit.widest == widest] for widest in (True, False)]
     return {
-        "BETWEEN": _numbers(np.transpose([base[pair.second] - base[pair.first] for pair in pairs])),
-        "SIDE": _numbers([pair.side for pair in pairs]), "JOINT_COSINE": _numbers(edges),
+        "BETWEEN": np.transpose([base[pair.second] - base[pair.first] for pair in pairs]),
+        "SIDE": [pair.side for pair in pairs], "JOINT_COSINE": edges,
     }  # fmt: skip
 
 
@@ -175,7 +185,8 @@ def _numbers(value: ArrayLike) -> str:
     return f"{number:.1f}" if number == int(number) and abs(number) < 1e6 else number.hex()
 
 
-def _filled(text: str, words: Mapping[str, str]) -> str:
+def filled(text: str, words: Mapping[str, str]) -> str:
+    """Return a source with its names replaced."""
     for name, value in words.items():
         text = text.replace(f"@{name}@", value)
     return text

@@ -1,0 +1,1 @@
+"""Kinematics as Structured Text, for controllers that are programmed by IEC 61131-3: CODESYS, TwinCAT."""
