@@ -12,6 +12,7 @@ VERBS = {
     "plan": "pentapod.cli.commands.plan:plan",
     "verify": "pentapod.cli.commands.verify:verify",
     "simulate": "pentapod.cli.commands.simulate:simulate",
+    "monitor": "pentapod.cli.running.monitor:monitor",
     "view": "pentapod.cli.commands.view:view",
     "sheet": "pentapod.cli.commands.sheet:sheet",
     "post": "pentapod.cli.commands.post:post",

@@ -118,8 +118,7 @@ class Machine(Value):
         for key, values in rows.items():
             if len(values) != count:
                 raise MachineError("wrong count", key=key, value=len(values), expected=f"one for each of {count} legs")
-        on_line = not self.robot.arms.any() and self.limb is None
-        if self.drive_forces.limited and not (on_line and not getattr(self.robot, "radii", np.zeros(1)).any()):
+        if self.drive_forces.limited and not self.forces_known:
             raise MachineError(
                 "forces of the drives are known only where all legs end on the tool's line and nothing else holds it",
                 key="peak_force",
@@ -156,6 +155,12 @@ class Machine(Value):
     def bars(self) -> Bars:
         """The legs, and the passive limb, as bodies."""
         return Bars(self.robot, self.limb, self.bodies.leg_radius)
+
+    @property
+    def forces_known(self) -> bool:
+        """Whether all legs end on the tool's line and nothing else holds it, so that `Dynamics` knows the forces."""
+        on_line = not self.robot.arms.any() and self.limb is None
+        return on_line and not getattr(self.robot, "radii", np.zeros(1)).any()
 
     @property
     def line_top(self) -> float:
