@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compiled_player import CompiledPlayer
 
 from compiled_kinematics import COMPILER, STRICT, compiled
 from linuxcnc_runs import built, play
@@ -21,6 +20,7 @@ from pentapod.program import Program, read_csv, write_csv
 from pentapod.program.posts import PostInput, read_post
 from pentapod.program.posts.linuxcnc.player import COEFFICIENTS, player_files, spline_coefficients
 from pentapod.program.posts.motion import lengths_at
+from pentapod.simulate.paced import Player
 from short_motion import given, motion, post
 
 pytestmark = compiled
@@ -36,6 +36,11 @@ def shares(machine: Machine, legs, period):
 
 def off_path(program: Program, legs, places):
     return np.abs(legs - lengths_at(program, places * program.period)).max()
+
+
+def played(player: Player, wanted, **rows):
+    run = player.play(wanted, **rows)
+    return run.legs, run.rows, run.paces, run.states
 
 
 def random_overrides(count, seed):
@@ -55,24 +60,24 @@ def there_and_back(program: Program, times: int) -> Program:
 
 
 @pytest.fixture(scope="module")
-def fast(tmp_path_factory):
+def fast():
     """A program at 98 % of the accelerations, forth and back, on a machine that hardly limits the jerk."""
     program, machine = motion(AT_THE_LIMIT_S)
     machine = dataclasses.replace(machine, legs=dataclasses.replace(machine.legs, max_jerk=np.full(5, 1e6)))
     source = dataclasses.replace(program.provenance, machine_digest=machine.digest)
     program = there_and_back(dataclasses.replace(program, provenance=source), 6)
-    return program, machine, CompiledPlayer(program, machine, tmp_path_factory.mktemp("fast"))
+    return program, machine, Player(program, machine)
 
 
 @pytest.fixture(scope="module")
-def jerky(tmp_path_factory):
+def jerky():
     """A program that uses 97 % of its jerk, forth and back."""
     program, machine = motion(1.0)
     jerk = np.abs(np.diff(program.legs, 3, axis=0)).max() / program.period**3 / 0.97
     machine = dataclasses.replace(machine, legs=dataclasses.replace(machine.legs, max_jerk=np.full(5, jerk)))
     source = dataclasses.replace(program.provenance, machine_digest=machine.digest)
     program = there_and_back(dataclasses.replace(program, provenance=source), 6)
-    return program, machine, CompiledPlayer(program, machine, tmp_path_factory.mktemp("jerky"))
+    return program, machine, Player(program, machine)
 
 
 @pytest.fixture(params=["fast", "jerky"])
@@ -90,7 +95,7 @@ def test_coefficients_are_those_of_the_spline() -> None:
 
 def test_at_full_override_the_program_is_played(case) -> None:
     program, machine, player = case
-    legs, places, paces, states = player.play(np.ones(2 * len(program.legs)))
+    legs, places, paces, states = played(player, np.ones(2 * len(program.legs)))
     assert not states.any()
     assert off_path(program, legs, places) < 1e-9
     assert (paces[60:] == 1.0).all()
@@ -103,7 +108,7 @@ def test_at_full_override_the_program_is_played(case) -> None:
 def test_random_overrides_keep_limits_and_path(case, seed) -> None:
     program, machine, player = case
     wanted = random_overrides(6 * len(program.legs), seed)
-    legs, places, paces, states = player.play(wanted)
+    legs, places, paces, states = played(player, wanted)
     assert not states.any()
     assert max(shares(machine, legs, program.period)[:2]) <= 1.0
     # Lengths in the file have ten decimals of a millimetre, whose third differences are small.
@@ -122,16 +127,16 @@ def test_the_override_is_reached_and_held(case) -> None:
     for share in (0.25, 0.6, 0.9):
         wanted = np.full(6 * len(program.legs), share)
         wanted[:1500] = 1.0
-        legs, _, paces, _ = player.play(wanted)
+        legs, _, paces, _ = played(player, wanted)
         assert (paces[2600:] == share).all()
         assert len(legs) == pytest.approx(1500 + (len(program.legs) - 1500) / share, rel=0.05)
         assert max(shares(machine, legs, program.period)) <= 1.0 + 1e-5
 
 
-def test_above_one_where_the_limits_leave_room(tmp_path) -> None:
+def test_above_one_where_the_limits_leave_room() -> None:
     program, machine = motion(4.0)
-    player = CompiledPlayer(program, machine, tmp_path)
-    legs, places, paces, _ = player.play(np.full(6000, 1.2))
+    player = Player(program, machine)
+    legs, places, paces, _ = played(player, np.full(6000, 1.2))
     assert len(legs) < 3500
     assert (paces[100:] == 1.2).all()
     assert max(shares(machine, legs, program.period)) < 0.5
@@ -140,7 +145,7 @@ def test_above_one_where_the_limits_leave_room(tmp_path) -> None:
 
 def test_above_one_falls_back_where_they_leave_none(fast) -> None:
     program, machine, player = fast
-    legs, _, paces, _ = player.play(np.full(2 * len(program.legs), 1.2))
+    legs, _, paces, _ = played(player, np.full(2 * len(program.legs), 1.2))
     assert paces.max() > 1.0
     assert (paces[100:] <= 1.0).any()
     assert max(shares(machine, legs, program.period)[:2]) <= 1.0
@@ -152,7 +157,7 @@ def test_a_hold_stands_on_the_path_and_goes_on(case) -> None:
     for begun in range(700, 1500, 57):
         wanted = np.ones(4 * len(program.legs))
         wanted[begun : begun + 2500] = 0.0
-        legs, _, paces, _ = player.play(wanted)
+        legs, _, paces, _ = played(player, wanted)
         standing = np.flatnonzero(paces == 0.0)
         standing = standing[standing > 100]
         assert standing[0] - begun < 1000
@@ -164,7 +169,7 @@ def test_a_hold_stands_on_the_path_and_goes_on(case) -> None:
 
 def test_rows_that_stop_coming_stop_the_player_in_time(jerky) -> None:
     program, machine, player = jerky
-    legs, places, paces, states = player.play(np.ones(12_000), fed=1200)
+    legs, places, paces, states = played(player, np.ones(12_000), fed=1200)
     assert (states[-1] == 1) & (paces[-1] == 0.0)
     assert places[-1] < 1200 + 2048
     assert max(shares(machine, legs, program.period)) <= 1.0 + 1e-5
@@ -175,7 +180,7 @@ def test_overrides_that_are_none_count_as_the_nearest(fast, wrong) -> None:
     program, machine, player = fast
     wanted = np.ones(3 * len(program.legs))
     wanted[1000:2000] = wrong
-    legs, _, paces, _ = player.play(wanted)
+    legs, _, paces, _ = played(player, wanted)
     assert max(shares(machine, legs, program.period)[:2]) <= 1.0
     assert paces[1900] == 0.0 if wrong != np.inf else paces[1000:2000].max() <= 1.2
 
@@ -213,15 +218,14 @@ def test_the_component_compiles_without_a_warning(tmp_path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shape", ["raster", "spiral"])
-def test_planned_programs_keep_limits_with_random_overrides(make_job, tmp_path, shape) -> None:
-    strategy = () if shape == "raster" else (('strategy = "raster"', 'strategy = "spiral"'),)
-    job = make_job(*strategy)
+@pytest.mark.parametrize("stepover", ["15", "9"])
+def test_planned_programs_keep_limits_with_random_overrides(make_job, tmp_path, stepover) -> None:
+    job = make_job(("stepover_mm = 15", f"stepover_mm = {stepover}"))
     assert run(["plan", str(job), "-o", str(tmp_path / "out"), "-q"]) == 0
     program, machine = read_csv(tmp_path / "out" / "program.csv"), Machine.load("desk")
-    player = CompiledPlayer(program, machine, tmp_path / "player")
+    player = Player(program, machine)
     for seed in range(4):
-        legs, places, paces, states = player.play(random_overrides(5 * len(program.legs), seed))
+        legs, places, paces, states = played(player, random_overrides(5 * len(program.legs), seed))
         assert not states.any()
         assert max(shares(machine, legs, program.period)) <= 1.0 + 1e-5
         assert off_path(program, legs, places) < 1e-9

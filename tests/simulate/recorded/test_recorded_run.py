@@ -11,6 +11,7 @@ import pytest
 from recorded_logs import log_of, paced, with_errors
 
 from pentapod.base.errors import InputError
+from pentapod.machine import Machine
 from pentapod.program import Program
 from pentapod.program.posts.motion import lengths_at
 from pentapod.simulate import Reference, simulate_servo
@@ -18,7 +19,7 @@ from pentapod.simulate.forces import leg_loads
 from pentapod.simulate.recorded.comparison import compare
 
 sys.path.append(str(Path(__file__).parents[2]))
-from short_motion import motion
+from short_motion import loop, motion
 
 UM = 1e-6
 
@@ -196,3 +197,19 @@ def test_commands_of_a_leg_model_are_read_as_legs(reference) -> None:
     assert np.abs(told - program.legs).max() > 20.0 * UM
     run = compare(log_of(program.times, told), Reference(program, machine))
     assert measure(run, "leg error").largest < 1e-6
+
+
+@pytest.mark.parametrize("name", ["hexa", "prpu", "bench-general"])
+def test_other_machines_run_too(name) -> None:
+    machine = Machine.load(name)
+    program = loop(machine, 1.5)
+    offset = np.zeros(program.legs.shape[1])
+    offset[0] = 20.0 * UM
+    times, due = paced(program, [(0.0, 1.0), (0.6, 0.0), (1.1, 0.8)], 3.0)
+    held = compare(log_of(times, lengths_at(program, due) + offset), Reference(program, machine))
+    assert held.errors.offset == pytest.approx(offset, abs=1.0 * UM)
+    assert len(held.holds) == 1
+    assert (held.expected is None) == (not machine.forces_known)
+    run = compare(log_of(program.times, program.legs + offset), Reference(program, machine))
+    assert run.errors.offset == pytest.approx(offset, abs=0.01 * UM)
+    assert measure(run, "contour error").largest == pytest.approx(measure(held, "contour error").largest, rel=0.02)

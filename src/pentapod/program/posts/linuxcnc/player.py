@@ -71,7 +71,7 @@ def numbers_text(machine: Machine, program: Program) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _table(program: Program) -> Floats:
+def coefficient_table(program: Program) -> Floats:
     """Return rows for the player: how many coefficients have come, then the last two, mm."""
     coefficients = spline_coefficients(program)
     even = np.concatenate([coefficients, coefficients[-1:]])[: len(coefficients) + len(coefficients) % 2]
@@ -82,7 +82,7 @@ def _table(program: Program) -> Floats:
 
 def _stream(program: Program) -> bytes:
     """Return the file for halstreamer."""
-    text, table = io.StringIO(), _table(program)
+    text, table = io.StringIO(), coefficient_table(program)
     np.savetxt(text, table, ["%d", *[f"%.{DECIMALS}f"] * (table.shape[1] - 1)])
     return (header_text(program) + text.getvalue()).encode()
 
@@ -94,7 +94,7 @@ def check_coefficients(file: Path, program: Program) -> None:
         found = np.loadtxt([line for line in lines if not line.startswith("#")], comments=None, ndmin=2)
     except ValueError:
         found = np.empty((0, 0))
-    wanted = _table(program)
+    wanted = coefficient_table(program)
     if found.shape != wanted.shape or not np.abs(found - wanted).max() < SAME_MM:
         raise ProgramError(
             "the player's coefficients are not those of the program", file=file, remedy="write the post again"
