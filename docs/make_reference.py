@@ -38,6 +38,7 @@ PACKAGES = (
     "pentapod.program.posts",
     "pentapod.verify",
     "pentapod.simulate",
+    "pentapod.simulate.recorded",
     "pentapod.job",
     "pentapod.batch",
 )

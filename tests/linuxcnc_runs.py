@@ -29,17 +29,17 @@ built = pytest.mark.skipif(bool(UNBUILT), reason=UNBUILT)
 """Where the kinematics module is compiled as well."""
 
 
-def play(folder: Path, code: int = 0, seconds: float = 120.0) -> np.ndarray:
-    """Run a folder's play.sh to its exit code, in so many seconds; return what was recorded, samples' numbers left out.
+def play(folder: Path, code: int = 0, seconds: float = 120.0, words: tuple[str, ...] = ()) -> np.ndarray:
+    """Run a folder's play.sh with these words to its exit code, in so many seconds.
 
-    There are no gaps in these numbers.
+    Returns what was recorded, samples' numbers left out; there are no gaps in these numbers.
     """
     log = folder / "test.log"
     # One at a time on a host: LinuxCNC has one lock file for all.
     with (Path(tempfile.gettempdir()) / "pentapod-test-linuxcnc.lock").open("w") as lock, log.open("w") as out:
         fcntl.flock(lock, fcntl.LOCK_EX)
         left = subprocess.run(
-            ["sh", "play.sh"],
+            ["sh", "play.sh", *words],
             cwd=folder,
             stdin=subprocess.DEVNULL,
             stdout=out,

@@ -12,6 +12,8 @@ VERBS = {
     "plan": "pentapod.cli.commands.plan:plan",
     "verify": "pentapod.cli.commands.verify:verify",
     "simulate": "pentapod.cli.commands.simulate:simulate",
+    "override": "pentapod.cli.running.override:override",
+    "monitor": "pentapod.cli.running.monitor:monitor",
     "view": "pentapod.cli.commands.view:view",
     "sheet": "pentapod.cli.commands.sheet:sheet",
     "post": "pentapod.cli.commands.post:post",

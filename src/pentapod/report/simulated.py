@@ -1,4 +1,4 @@
-"""The page on a simulation: every measure against time, one self-contained HTML file."""
+"""The pages on a simulation and on a recorded run: every measure against time, one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from pentapod.report.pack import Packed
 from pentapod.report.series import Curve, Row, bucket_places, extremes, packed_rows
 from pentapod.report.template import write_page
 from pentapod.simulate import Tracking
+from pentapod.simulate.recorded.recorded_run import RecordedRun
 
 RUNS = (("#296cb8", ()), ("#b64165", (6, 3)))
 """Colour and dash of each run."""
@@ -37,6 +38,39 @@ def write_simulation(
         heading="Against time",
         lines=[line.strip() for line in lines],
         legs=[leg_colour(k) for k in range(runs[-1][1].played.legs.shape[1])],
+    )
+
+
+def write_recorded(path: str | Path, title: str, lines: Sequence[str], run: RecordedRun) -> Path:
+    """Write the page on a recorded run and return its path. lines: its figures as text. Raises InputError."""
+    packed, buckets = Packed(), DETAIL.buckets
+    legs = [Curve(f"leg {k + 1}", leg_colour(k)) for k in range(run.legs.shape[1])]
+    rows = [
+        Row(f"{measure.name}, {measure.unit}", extremes(measure.values[:, None], buckets), [Curve("", RUNS[0][0])])
+        for measure in run.measures
+    ]
+    rows.append(
+        Row("pace, s of the program in a second", extremes(run.pace[:, None], buckets), [Curve("", RUNS[0][0])])
+    )
+    for name, values in (
+        ("error of each leg, mm", 1e3 * run.legs),
+        ("expected force of each drive, N", run.expected),
+        ("measured force of each drive, N", run.measured),
+    ):
+        if values is not None:
+            rows.append(Row(name, extremes(values, buckets), legs, grouped=True))
+    return write_page(
+        path,
+        "figures.html.j2",
+        {"plots": packed_rows(packed, bucket_places(run.times, buckets), rows, "time of the log, s", " s")},
+        packed,
+        title=title,
+        about="recorded run",
+        kind="pentapod monitor, a recorded run",
+        summary="Figures",
+        heading="Against time",
+        lines=[line.strip() for line in lines],
+        legs=[leg_colour(k) for k in range(run.legs.shape[1])],
     )
 
 

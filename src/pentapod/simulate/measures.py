@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -94,35 +95,17 @@ class Tracking(Value):
     @cached_property
     def cutting(self) -> Bools:
         """Whether each row (N,) belongs to a cut of the toolpath."""
-        kinds = np.array([segment.kind == SegmentKind.CUT for segment in self.toolpath.segments])
-        intervals = np.minimum(self._match.places.astype(np.intp), len(self.toolpath) - 2)
-        return kinds[self.toolpath.segment_of_interval[intervals]]
+        return on_cuts(self._match, self.toolpath)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the measures as JSON takes them, by name with unit."""
-        period = self.reference.program.period
-        return {
-            measure.key: {
-                "largest": measure.largest,
-                "rms": measure.rms,
-                "time_s": round(measure.row * period, 9),
-                **({"largest_on_cuts": float(measure.values[self.cutting].max())} if self.cutting.any() else {}),
-            }
-            for measure in self.measures
-        }
+        return measured_dict(self.measures, self.reference.program.times, self.cutting)
 
     def lines(self) -> list[str]:
         """Return the measures as text, a line for each."""
-        period = self.reference.program.period
-        lines: list[str] = []
-        for measure in self.measures:
-            line = f"  {measure.name + ':':<20} largest {measure.largest:.3g} {measure.unit}"
-            line += f" at {measure.row * period:.3f} s, rms {measure.rms:.2g} {measure.unit}"
-            if self.cutting.any():
-                line += f"; on cuts at most {measure.values[self.cutting].max():.3g} {measure.unit}"
-            if measure.name == TO_TOOLPATH:
-                line += f" (tolerance of the job: {1e3 * self.tolerance:g} mm)"
-            lines.append(line)
+        lines = measured_lines(self.measures, self.reference.program.times, self.cutting)
+        bounded = [measure.name for measure in self.measures].index(TO_TOOLPATH)
+        lines[bounded] += f" (tolerance of the job: {1e3 * self.tolerance:g} mm)"
         return lines
 
     @cached_property
@@ -131,6 +114,38 @@ class Tracking(Value):
         axes = home.rotate(-self.played.directions)
         course = PosedPolyline(home.apply(self.played.tips) + self.toolpath.tilt_centre * axes, axes)
         return match(course, PosedPolyline(self.toolpath.tilt_centres, self.toolpath.axes), self.tolerance)
+
+
+def on_cuts(matched: PathMatch, toolpath: Toolpath) -> Bools:
+    """Return whether each sample (M,) of a motion that was matched with a toolpath belongs to a cut."""
+    kinds = np.array([segment.kind == SegmentKind.CUT for segment in toolpath.segments])
+    intervals = np.minimum(matched.places.astype(np.intp), len(toolpath) - 2)
+    return kinds[toolpath.segment_of_interval[intervals]]
+
+
+def measured_dict(measures: Sequence[Measure], times: Floats, cutting: Bools) -> dict[str, Any]:
+    """Return measures at rows with times (N,) as JSON takes them, by name with unit. cutting (N,): rows on cuts."""
+    return {
+        measure.key: {
+            "largest": measure.largest,
+            "rms": measure.rms,
+            "time_s": round(float(times[measure.row]), 9),
+            **({"largest_on_cuts": float(measure.values[cutting].max())} if cutting.any() else {}),
+        }
+        for measure in measures
+    }
+
+
+def measured_lines(measures: Sequence[Measure], times: Floats, cutting: Bools) -> list[str]:
+    """Return measures as text, a line for each; see `measured_dict`."""
+    lines: list[str] = []
+    for measure in measures:
+        line = f"  {measure.name + ':':<20} largest {measure.largest:.3g} {measure.unit}"
+        line += f" at {times[measure.row]:.3f} s, rms {measure.rms:.2g} {measure.unit}"
+        if cutting.any():
+            line += f"; on cuts at most {measure.values[cutting].max():.3g} {measure.unit}"
+        lines.append(line)
+    return lines
 
 
 def contour_errors(

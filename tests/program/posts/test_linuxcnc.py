@@ -111,7 +111,7 @@ def test_an_unverified_folder_runs_with_its_mark_in_every_file(tmp_path):
     write_post(given(duration=1.0), "linuxcnc", tmp_path, unverified=True)
     files = [file for file in tmp_path.rglob("*") if file.is_file()]
     assert all("UNVERIFIED" in "".join(file.read_text().splitlines()[:2]) for file in files)
-    for part in ("stream", "trivkins", "kinematics"):
+    for part in ("stream", "player", "trivkins", "kinematics"):
         table = play(tmp_path / part)
         assert len(table) > 300
 

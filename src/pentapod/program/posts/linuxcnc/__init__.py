@@ -1,4 +1,4 @@
-"""LinuxCNC: a folder with three configurations that run in simulation as they are; see its README."""
+"""LinuxCNC: a folder with four configurations that run in simulation as they are; see its README."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ from pathlib import Path
 
 from pentapod.base.errors import MachineError
 from pentapod.program.posts.drives import HALSTREAMER
-from pentapod.program.posts.linuxcnc import kinematics, stream, trivkins
+from pentapod.program.posts.linuxcnc import kinematics, player, stream, trivkins
 from pentapod.program.posts.linuxcnc.config import packaged
 from pentapod.program.posts.registry import Post, PostInput, register
 from pentapod.program.program import Program
 from pentapod.toolpath.toolpath import Toolpath
 
-__all__ = ["LINUXCNC", "kinematics", "stream", "trivkins"]
+__all__ = ["LINUXCNC", "kinematics", "player", "stream", "trivkins"]
 
 
 def _write(given: PostInput) -> dict[str, bytes]:
     folders = {"stream": stream.stream_files(given), "trivkins": trivkins.trivkins_files(given)}
+    folders["player"] = player.player_files(given)
     program, note = given.program, ""
     try:
         of_machine = given.the_machine(), program.component, program.period, given.toolpath
@@ -41,7 +42,10 @@ def _write(given: PostInput) -> dict[str, bytes]:
 
 
 def _read(folder: Path) -> Program | Toolpath:
-    return HALSTREAMER.read(folder / "stream")
+    found = HALSTREAMER.read(folder / "stream")
+    if isinstance(found, Program) and found.laser_power is None:
+        player.check_coefficients(folder / "player" / player.COEFFICIENTS, found)
+    return found
 
 
 LINUXCNC = register(

@@ -18,6 +18,20 @@ def stream_files(given: PostInput) -> dict[str, bytes]:
     return {**HALSTREAMER.write(given), "stream.hal": hal.encode(), "play.sh": packaged("play_stream.sh")}
 
 
+def limit_lines(machine: Machine) -> list[str]:
+    """Return the lines of HAL that set each leg's `limit3` to the limits of the machine."""
+    limits, lines = machine.legs, list[str]()
+    for k in range(machine.robot.n_legs):
+        leg = f"leg{k + 1}"
+        lines += [
+            f"setp {leg}.min {number(1e3 * limits.min_length[k])}",
+            f"setp {leg}.max {number(1e3 * limits.max_length[k])}",
+            f"setp {leg}.maxv {number(1e3 * limits.max_velocity[k] * (1.0 + ROUNDING))}",
+            f"setp {leg}.maxa {number(1e3 * limits.max_acceleration[k] * (1.0 + ROUNDING))}",
+        ]
+    return lines
+
+
 def _hal(machine: Machine, period_ns: int, *, powered: bool) -> str:
     """Return the HAL. powered: whether the rows end with the laser's power, for the signal laser-power."""
     count = machine.robot.n_legs
@@ -32,17 +46,12 @@ def _hal(machine: Machine, period_ns: int, *, powered: bool) -> str:
         *(f"addf leg{leg} servo-thread" for leg in range(1, count + 1)),
         "addf sampler.0 servo-thread",
     ]
-    limits = machine.legs
     for k in range(count):
-        leg = f"leg{k + 1}"
         lines += [
-            f"net setpoint{k + 1} streamer.0.pin.{k} => {leg}.in sampler.0.pin.{k}",
-            f"net limited{k + 1} {leg}.out => sampler.0.pin.{k + count}",
-            f"setp {leg}.min {number(1e3 * limits.min_length[k])}",
-            f"setp {leg}.max {number(1e3 * limits.max_length[k])}",
-            f"setp {leg}.maxv {number(1e3 * limits.max_velocity[k] * (1.0 + ROUNDING))}",
-            f"setp {leg}.maxa {number(1e3 * limits.max_acceleration[k] * (1.0 + ROUNDING))}",
+            f"net setpoint{k + 1} streamer.0.pin.{k} => leg{k + 1}.in sampler.0.pin.{k}",
+            f"net limited{k + 1} leg{k + 1}.out => sampler.0.pin.{k + count}",
         ]
+    lines += limit_lines(machine)
     if powered:
         lines.append(f"net laser-power streamer.0.pin.{count}")
     return "\n".join(lines) + "\n"

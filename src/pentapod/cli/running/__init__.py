@@ -1,0 +1,1 @@
+"""Commands about programs that run, or have run, on a machine."""
