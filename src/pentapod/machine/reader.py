@@ -24,7 +24,7 @@ from pentapod.kinematics.robot import Robot
 from pentapod.machine.drives import DriveForces, Drives, Masses
 from pentapod.machine.families import FAMILIES, legs_of
 from pentapod.machine.leg_model import LegModel
-from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
+from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, Park, ToolLimits, WorkVolume
 from pentapod.machine.tables import FILE_KEYS, GuideKeys, MachineTables, MachineToolKeys, PlatformJointKeys
 
 if TYPE_CHECKING:
@@ -131,6 +131,7 @@ def _fields(tables: Any, file: str | Path) -> dict[str, Any]:
         "bodies": Bodies(**fields_from(Bodies, tables.bodies)),
         "controller": ControllerSettings(**fields_from(ControllerSettings, tables.controller)),
         "work": WorkVolume(**fields_from(WorkVolume, tables.work)),
+        "park": Park(**fields_from(Park, tables.park)),
         "drives": Drives(**fields_from(Drives, tables.drives)),
         "drive_forces": DriveForces(**fields_from(DriveForces, tables.drives)),
         "masses": Masses(**fields_from(Masses, tables.masses)),

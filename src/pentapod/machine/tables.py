@@ -15,7 +15,7 @@ from pentapod.machine.drives import DriveForces, Drives, Masses
 from pentapod.machine.families import OfFamily
 from pentapod.machine.fields import LEG_PAIRS, PER_LEG, each_leg
 from pentapod.machine.leg_model import LegModel
-from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, ToolLimits, WorkVolume
+from pentapod.machine.parts import Bodies, ControllerSettings, JointLimits, LegLimits, Park, ToolLimits, WorkVolume
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +73,7 @@ PARTS: dict[str, tuple[type, ...]] = {
     "tool": (MachineToolKeys, ToolLimits),
     "controller": (ControllerSettings,),
     "work": (WorkVolume,),
+    "park": (Park,),
     "drives": (Drives, DriveForces),
     "masses": (Masses,),
 }
