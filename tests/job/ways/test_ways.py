@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import json
-import shutil
 from dataclasses import replace
-from importlib import resources
 
 import numpy as np
 import pytest
 
+from parked_jobs import DESK, parked_job
 from pentapod.base.errors import MachineError
-from pentapod.cli.commands.new import dome_stl
 from pentapod.geometry import RigidTransform
-from pentapod.job import Job, judge, run
+from pentapod.job import judge, run
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.ways.claims import with_ways
@@ -24,34 +22,6 @@ from pentapod.machine.machine import read_machine
 from pentapod.program import quantised, read_csv, write_csv
 from pentapod.toolpath.formats import read_toolpath
 from pentapod.verify import Replay
-from usual_job import job_text
-
-DESK = (resources.files("pentapod.machine") / "library" / "desk.toml").read_text(encoding="utf-8")
-PARK = "\n[park]\ntip_mm = [85, -17, 430]\n"
-
-
-def parked_job(folder, park=PARK):
-    (folder / "part.stl").write_bytes(dome_stl(cells=12))
-    (folder / "parked.toml").write_text(DESK + park, encoding="utf-8")
-    (folder / "job.toml").write_text(job_text().replace('name = "desk"', 'file = "parked.toml"'), encoding="utf-8")
-    return Job.load(folder / "job.toml")
-
-
-@pytest.fixture(scope="module")
-def parked(tmp_path_factory):
-    """The usual job on a machine with a park pose, and the folder of its run, to be read or copied."""
-    folder = tmp_path_factory.mktemp("parked")
-    job = parked_job(folder)
-    outcome = run(job, folder / "out", advice=None)
-    assert outcome.passed, outcome.refusal
-    return job, folder / "out"
-
-
-@pytest.fixture
-def copied(parked, tmp_path):
-    job, out = parked
-    shutil.copytree(out, tmp_path / "out")
-    return job, tmp_path / "out"
 
 
 def specification_of(job, out):

@@ -157,9 +157,16 @@ def _placed(
     return placed_on(Toolpath(tuple(segments)), program, margins)
 
 
-def placed_on(toolpath: Toolpath, program: Program, margins: Margins) -> tuple[PlacedPath, Floats]:
-    """Return a toolpath with its own axes where the program's part is, and its margins (N, M)."""
-    tips, axes = program.placement.apply(toolpath.tips), program.placement.rotate(toolpath.axes)
+def placed_on(
+    toolpath: Toolpath, program: Program, margins: Margins, planned: Floats | None = None
+) -> tuple[PlacedPath, Floats]:
+    """Return a toolpath where the program's part is, and its margins (N, M).
+
+    planned (N, 3): axes about the toolpath's tilt centres, workpiece frame; the toolpath's own where there are none.
+    """
+    own = toolpath.axes if planned is None else planned
+    tips = program.placement.apply(toolpath.tilt_centres - toolpath.tilt_centre * own)
+    axes = program.placement.rotate(own)
     values = margins(tips, axes, program.placement)
     values = np.where(np.isfinite(values), values, -1.0)
     placement = Placement(program.placement, "that of the program", program.rail_positions)
