@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pentapod.base.arrays import Floats
 from pentapod.base.errors import ProgramError
 from pentapod.program.program import Program, Switch
 

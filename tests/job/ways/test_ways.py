@@ -10,6 +10,7 @@ import pytest
 
 from parked_jobs import DESK, parked_job
 from pentapod.base.errors import MachineError
+from pentapod.cli.main import run as run_command
 from pentapod.geometry import RigidTransform
 from pentapod.job import judge, run
 from pentapod.job.build.specification import job_specification
@@ -146,3 +147,12 @@ def test_wrong_keys_of_a_park_pose_are_one_error(table, words):
 def test_machines_without_a_park_pose_have_no_ways(tmp_path):
     machine = read_machine(DESK, "desk.toml")
     assert machine.park.pose is None
+
+
+def test_the_set_up_sheet_names_the_park_pose(parked, tmp_path):
+    _, out = parked
+    assert run_command(["sheet", str(out), "-o", str(tmp_path / "sheet.html"), "--quiet"]) == 0
+    text = (tmp_path / "sheet.html").read_text(encoding="utf-8")
+    row = text[text.index(">park<") :][:300]
+    assert "430" in row
+    assert "614.401" in row
