@@ -108,8 +108,9 @@ def restart(job: Job, file: Path, seconds: float, progress: Progress = silent) -
         verdict = judged(Path(folder) / PROGRAM, specification, claims=way_claims(made), progress=progress)
     fails = withheld(verdict)
     if fails is not None or not verdict.passed:
-        cause = verdict.answer if fails is None else fails.cause
-        return Refusal(STAGE, f"from {begins:.3f} s, {cause}", remedy="Choose another time, on a rapid where it can be")
+        why = verdict.answer if fails is None else fails.cause
+        cause = f"what is left of the program does not pass: from {begins:.3f} s, {why}"
+        return Refusal(STAGE, cause, remedy="Choose another time, on a rapid where it can be")
     return Restart(from_park(left, made), machine, verdict, begins, waypoint)
 
 
