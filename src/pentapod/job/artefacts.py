@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pentapod.base.errors import InputError
 from pentapod.base.files import atomic_write, packed_arrays
+from pentapod.job.ways.names import FILES as WAYS
 
 PROGRAM, VERDICT, REPORT, ARRAYS = "program.csv", "verdict.json", "report.html", "plan.npz"
 SHEET = "sheet.html"
@@ -21,7 +22,7 @@ WITHHELD = "withheld.csv"
 """A program that fails its own verdict: to be looked at, never to be run."""
 
 MANIFEST = "manifest.json"
-NAMES = (PROGRAM, WITHHELD, ARRAYS, REPORT, SHEET, VERDICT, MANIFEST)
+NAMES = (PROGRAM, *WAYS.values(), WITHHELD, ARRAYS, REPORT, SHEET, VERDICT, MANIFEST)
 """In the order in which they are moved into the folder; the manifest is last and marks a complete run."""
 
 SETUPS = "setup-[1-9]*"

@@ -162,7 +162,7 @@ def setups_verdict(verdicts: Sequence[tuple[int, Verdict]], cuts: int, missed: i
     parts = [(f"set-up {number}: ", verdict) for number, verdict in verdicts]
     certificates = (replace(c, claim=before + c.claim) for before, verdict in parts for c in verdict.certificates)
     unjudged = (replace(n, claim=before + n.claim) for before, verdict in parts for n in verdict.not_judged)
-    sources = replace(verdicts[0][1].sources, program=None) if verdicts else NO_SOURCES
+    sources = replace(verdicts[0][1].sources, program=None, way_in=None, way_out=None) if verdicts else NO_SOURCES
     return Verdict((whole, *certificates), tuple(unjudged), sources)
 
 

@@ -12,7 +12,7 @@ from pentapod.base.refusal import Refusal
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.search import TOUCHES, advised
 from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, write_arrays, write_json
-from pentapod.job.build.limits import timing_limits
+from pentapod.job.build.limits import placement_limits, timing_limits
 from pentapod.job.build.pieces import job_part, job_piece, job_without
 from pentapod.job.build.region import covers_region
 from pentapod.job.build.specification import job_specification
@@ -27,11 +27,15 @@ from pentapod.job.run_folder import unstaged
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import StageRunner
 from pentapod.job.task import Task
+from pentapod.job.ways.claims import with_ways
+from pentapod.job.ways.names import FILES
+from pentapod.job.ways.ways import remove_ways, ways, write_ways
 from pentapod.job.withheld import STAGE, failures, foreseen, withheld
 from pentapod.machine.machine import Machine
 from pentapod.planning import PlacedPath
 from pentapod.planning.placement.placed_path import UnplacedPath
 from pentapod.planning.setups import setups
+from pentapod.program import Program
 from pentapod.timing import Limit
 from pentapod.toolpath import Mesh, Toolpath
 from pentapod.toolpath.linking.partition import Piece, missed_cuts
@@ -99,7 +103,7 @@ def with_advice(
     again: plans a job and returns the stage that refuses it, if any, as `pipeline.refused_at`.
     """
     refusal, runner = outcome.refusal, task.runner
-    if refusal is None:
+    if refusal is None or refusal.stage in FILES:  # a way is refused by the machine's file, not by the job
         return outcome
     search = (task.job, task.machine, mesh, task.toolpath, again, options, runner.progress)
     failed = failures(outcome.verdict) if refusal.stage == STAGE else {}
@@ -139,18 +143,35 @@ def _foreseen(task: Task, staging: Path, writers: Mapping[str, Writer]) -> Outco
 
 def _planned(task: Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
     """Run the stages after the toolpath and the verification, write the files, and return the outcome."""
-    program, runner = task.program(staging / PROGRAM), task.runner
-    if isinstance(program, Refusal):
-        verdict = refusal_verdict(program, task.specification.sources)
+    file, runner = staging / PROGRAM, task.runner
+    program = task.program(file)
+    refused = program if isinstance(program, Refusal) else _with_ways(task, program, staging)
+    if refused is not None:
+        file.unlink(missing_ok=True)
+        verdict = refusal_verdict(refused, task.specification.sources)
     else:
-        file = staging / PROGRAM
-        verdict = runner.run(
-            "verify", lambda: judged(file, task.specification, claims=task.claims, progress=runner.progress)
-        )
+        specification, claims = with_ways(task.specification, staging)
+        claims = (*claims, *task.claims)
+        verdict = runner.run("verify", lambda: judged(file, specification, claims=claims, progress=runner.progress))
         if (fails := withheld(verdict)) is not None:
             runner.stages.append(Stage("withheld", 0.0, fails))
             file.rename(staging / WITHHELD)
+            remove_ways(staging)
     return _written(task, verdict, staging, writers)
+
+
+def _with_ways(task: Task, program: Program, staging: Path) -> Refusal | None:
+    """Make the ways of a program and write them beside it, where the machine has a park pose; or return a refusal."""
+    remove_ways(staging)
+    if task.machine.park.pose is None:
+        return None
+    machine = program.machine(task.machine)
+    specification, kinds = dataclasses.replace(task.specification, machine=machine), placement_limits(task.job)
+    made = task.runner.run("ways", lambda: ways(program, specification, limits=task.limits, kinds=kinds))
+    if isinstance(made, Refusal):
+        return made
+    write_ways(made, staging)
+    return None
 
 
 def _mended(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Mapping[str, Writer]) -> Outcome:

@@ -16,6 +16,7 @@ from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.mending import most_left_out
 from pentapod.job.outcome import setups_verdict
 from pentapod.job.schema.job import Job
+from pentapod.job.ways.claims import with_ways
 from pentapod.machine.machine import Machine
 from pentapod.toolpath.linking.partition import Piece, missed_cuts
 from pentapod.verify import Verdict, judged
@@ -52,7 +53,8 @@ def judge(
             lambda: program_toolpath(job, mesh, files[0], progress, machine=used, most=most_left_out(job)),
             own_machine=own_machine,
         )
-        return judged(files[0], specification, strict=strict, progress=progress)
+        specification, claims = with_ways(specification, files[0].parent)
+        return judged(files[0], specification, strict=strict, claims=claims, progress=progress)
     specification = job_specification(
         job, used, mesh, lambda: job_toolpath(job, mesh, progress, machine=used)[0], own_machine=own_machine
     )
@@ -62,7 +64,8 @@ def judge(
     verdicts: list[tuple[int, Verdict]] = []
     for number, (file, piece) in enumerate(zip(files, pieces, strict=True), start=1):
         own = replace(specification, toolpath=job_part(job, mesh, toolpath, piece, machine=used), missed=missed)
-        verdicts.append((number, judged(file, own, strict=strict, progress=progress)))
+        own, claims = with_ways(own, file.parent)
+        verdicts.append((number, judged(file, own, strict=strict, claims=claims, progress=progress)))
     return setups_verdict(verdicts, cuts, missed, job.placement.setups)
 
 

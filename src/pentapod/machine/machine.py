@@ -29,6 +29,7 @@ from pentapod.machine.parts import (
     ControllerSettings,
     JointLimits,
     LegLimits,
+    Park,
     Stiffness,
     ToolLimits,
     WorkVolume,
@@ -47,11 +48,11 @@ class Machine(Value):
 
     tool_length: metres from p (the platform line's origin, where offset = 0) along i to the tool tip.
     rapid_velocity: largest tip speed on rapids, m/s. drives, masses: programs depend on them only where drive_forces
-    has limits; cutting_force: newtons on the tip, in any direction, that drives with limits keep free on cuts. guides:
-    of a reconfigurable machine, on which the base joints are set before a program runs; rail_positions (n_legs,)
-    metres: where they stand; `robot` is the geometry there. calibration: from which `robot` is the machine as built;
-    None where it is the one that was designed. leg_model: from readings to what drives are told, in posts.
-    limb: the passive limb that holds the platform, where one does.
+    has limits; cutting_force: newtons on the tip, in any direction, that drives with limits keep free on cuts. park:
+    where the machine waits. guides: of a reconfigurable machine, on which the base joints are set before a program
+    runs; rail_positions (n_legs,) metres: where they stand; `robot` is the geometry there. calibration: from which
+    `robot` is the machine as built; None where it is the one that was designed. leg_model: from readings to what drives
+    are told, in posts. limb: the passive limb that holds the platform, where one does.
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
     spindle's nose would be above the lowest platform joint.
@@ -78,6 +79,7 @@ class Machine(Value):
     cutting_force: float = 0.0
     stiffness: Stiffness = field(default_factory=Stiffness)
     tool_limits: ToolLimits = field(default_factory=ToolLimits)
+    park: Park = field(default_factory=Park)
     guides: ReconfigurablePentapod | None = None
     calibration: CalibrationRecord | None = None
     leg_model: LegModel = field(default_factory=LegModel)

@@ -225,3 +225,48 @@ class WorkVolume(Value):
     def __post_init__(self) -> None:
         set_frozen(self, centre=frozen(self.centre, "centre", (3,)))
         check_fields(self, MachineError)
+
+
+@dataclass(frozen=True, eq=False)
+class Park(Value):
+    """The pose in which the machine waits before and after a program, machine frame; none where no tip is given.
+
+    tip (3,): metres. axis (3,): unit, tip → spindle; None for −z, the upright tool. Programs do not depend on it: it is
+    not in the machine's digest. Raises MachineError: an axis without tip, or one that is not of unit length to 1e-3 (it
+    is then normalised).
+    """
+
+    tip: Annotated[
+        Floats | None,
+        Key("mm", "tip of the tool where the machine waits; plans make the ways from there and back", kind=LIST_OF_3),
+    ] = None
+    axis: Annotated[
+        Floats | None, Key("", "tool axis there, unit, tip to spindle; upright by default", kind=LIST_OF_3)
+    ] = None
+
+    def __post_init__(self) -> None:
+        if self.tip is None:
+            if self.axis is not None:
+                raise MachineError(
+                    "a park pose needs its tip", key="park.tip_mm", expected="[x, y, z], as in work.centre_mm"
+                )
+            return
+        set_frozen(self, tip=frozen(self.tip, "park.tip_mm", (3,)))
+        if self.axis is not None:
+            axis = np.asarray(self.axis, dtype=np.float64)
+            length = float(np.linalg.norm(axis))
+            if not abs(length - 1.0) < 1e-3:
+                raise MachineError(
+                    "not of unit length",
+                    key="park.axis",
+                    value=axis.tolist(),
+                    expected="a unit vector, [0, 0, -1] upright",
+                )
+            set_frozen(self, axis=frozen(axis / length, "park.axis", (3,)))
+
+    @property
+    def pose(self) -> tuple[Floats, Floats] | None:
+        """Tip and tool axis (3,); None where the machine has no park pose."""
+        if self.tip is None:
+            return None
+        return self.tip, np.array([0.0, 0.0, -1.0]) if self.axis is None else self.axis

@@ -22,6 +22,7 @@ from pentapod.machine.parts import (
     JointStiffness,
     LegLimits,
     LegStiffness,
+    Park,
     ToolLimits,
     WorkVolume,
 )
@@ -82,6 +83,7 @@ PARTS: dict[str, tuple[type, ...]] = {
     "tool": (MachineToolKeys, ToolLimits),
     "controller": (ControllerSettings,),
     "work": (WorkVolume,),
+    "park": (Park,),
     "drives": (Drives, DriveForces),
     "masses": (Masses,),
 }

@@ -157,6 +157,12 @@ class PlannedRun(Value):
         """The tool upright in the middle of the work volume, tip there."""
         return self.pose(self.machine.work.centre, self.upwards)
 
+    @cached_property
+    def park(self) -> Pose | None:
+        """Where the machine waits; None where its file does not say so."""
+        park = self.machine.park.pose
+        return None if park is None else self.pose(*park)
+
     def pose(self, tip: Floats, axis: Floats) -> Pose:
         """Return the pose with a tip and a tool axis (3,), machine frame."""
         legs = self.machine.robot.leg_lengths(tip + self.machine.tool_length * axis, -axis)

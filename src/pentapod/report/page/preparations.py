@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-
 import numpy as np
 
 from pentapod.base.version import __version__, library_versions, processor_kind
@@ -73,7 +71,7 @@ def preparations(outcome: Outcome, signals: Signals | None) -> list[tuple[str, s
 def provenance(outcome: Outcome) -> list[tuple[str, str]]:
     """Return names and values of what the run was made from and with."""
     job, machine = outcome.job, outcome.machine
-    files = asdict(outcome.verdict.sources)
+    files = outcome.verdict.sources.to_dict()
     return [
         ("job", f"{job.path.name}, {job.digest}"),
         ("mesh", job.mesh_path.name),

@@ -105,16 +105,17 @@ def machine_sentence(run: PlannedRun) -> str:
 
 
 def poses(run: PlannedRun, points: Sequence[TouchOff]) -> list[PoseRow]:
-    """Return rows of poses: the first, those at touch-off points, the last, and home."""
+    """Return rows of poses: the first, those at touch-off points, the last, home, and the park pose if there is one."""
     touches = [
         PoseRow(f"touch-off {k}", _list(1e3 * p.tip, 2), _list(1e3 * p.legs, 3), _list(1e3 * p.in_machine, 2))
         for k, p in enumerate(points, start=1)
     ]
-    first, last, home = (
+    first, *others = (
         PoseRow(name, _list(1e3 * p.tip, 2), _list(1e3 * p.legs, 3), "")
-        for name, p in (("start", run.first), ("end", run.last), ("home", run.home))
+        for name, p in (("start", run.first), ("end", run.last), ("home", run.home), ("park", run.park))
+        if p is not None
     )
-    return [first, *touches, last, home]
+    return [first, *touches, *others]
 
 
 def cycle(run: PlannedRun) -> list[Row]:

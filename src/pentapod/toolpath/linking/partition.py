@@ -132,12 +132,12 @@ def with_cuts(toolpath: Toolpath, chosen: Bools, style: LinkStyle) -> Toolpath:
             after = None if b == last else (tips[b : b + 2], axes[b : b + 2])
             segments += connection(before, after, style)
         else:
-            segments += _stretch(toolpath, a, b)
-        segments += _stretch(toolpath, b, stop)
+            segments += stretch(toolpath, a, b)
+        segments += stretch(toolpath, b, stop)
     return replace(toolpath, segments=tuple(segments))
 
 
-def _stretch(toolpath: Toolpath, a: int, b: int) -> list[Segment]:
+def stretch(toolpath: Toolpath, a: int, b: int) -> list[Segment]:
     """Return the segments of a toolpath from waypoint a to waypoint b."""
     found: list[Segment] = []
     for segment, (start, end) in zip(toolpath.segments, pairwise(toolpath.starts.tolist()), strict=True):

@@ -19,7 +19,7 @@ class Sources(Value):
 
     machine: of the machine's file, also of one that is shipped. calibration: of the file that it names. fixture: of
     its mesh. toolpath_file and toolpath_curve: what the job's [toolpath] names (a drawing, points, a picture, a
-    toolpath; a guide curve).
+    toolpath; a guide curve). way_in, way_out: of the ways from the machine's park pose and back, where it has one.
     """
 
     program: str | None = None
@@ -31,6 +31,12 @@ class Sources(Value):
     stock: str | None = None
     toolpath_file: str | None = None
     toolpath_curve: str | None = None
+    way_in: str | None = None
+    way_out: str | None = None
+
+    def to_dict(self) -> dict[str, str | None]:
+        """Return its entry in verdict.json; the ways are named where they were judged."""
+        return {key: value for key, value in asdict(self).items() if value is not None or not key.startswith("way_")}
 
 
 NO_SOURCES = Sources()
@@ -165,7 +171,7 @@ class Verdict(Result):
             "passed": self.passed,
             "certificates": [asdict(c) for c in self.certificates],
             "not_judged": [asdict(entry) for entry in self.not_judged],
-            "sha256": asdict(self.sources),
+            "sha256": self.sources.to_dict(),
             "judged_by": {
                 "pentapod": __version__,
                 "libraries": library_versions(),
