@@ -52,11 +52,11 @@ if TYPE_CHECKING:
     from pentapod.machine.reader import shipped_machines as shipped_machines
     from pentapod.machine.report.drift import Drift as Drift
     from pentapod.machine.report.drift import drift as drift
+    from pentapod.machine.report.findings import MachineFinding as MachineFinding
     from pentapod.machine.report.modes import AssemblyPose as AssemblyPose
     from pentapod.machine.report.modes import AssemblyPoses as AssemblyPoses
     from pentapod.machine.report.modes import admissible_modes as admissible_modes
     from pentapod.machine.report.report import AMPLIFICATION_LIMIT as AMPLIFICATION_LIMIT
-    from pentapod.machine.report.report import MachineFinding as MachineFinding
     from pentapod.machine.report.report import MachineReport as MachineReport
     from pentapod.machine.report.report import check as check
     from pentapod.machine.report.report import explain as explain
@@ -82,7 +82,8 @@ _HOMES = {
     "machine.reader": "shipped_machines",
     "machine.report.drift": "Drift drift",
     "machine.report.modes": "AssemblyPose AssemblyPoses admissible_modes",
-    "machine.report.report": "AMPLIFICATION_LIMIT MachineFinding MachineReport check explain",
+    "machine.report.findings": "MachineFinding",
+    "machine.report.report": "AMPLIFICATION_LIMIT MachineReport check explain",
     "machine.rigid_bodies.mjcf": "mjcf",
     "machine.rigid_bodies.sdf": "sdf",
     "machine.work_volume": "sample_work_volume",

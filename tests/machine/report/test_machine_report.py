@@ -7,6 +7,7 @@ import pytest
 
 from pentapod.kinematics.component import Component
 from pentapod.machine import Machine, WorkVolume, check, explain, sample_work_volume
+from pentapod.machine.parts import Park
 
 
 @pytest.fixture(scope="module")
@@ -104,3 +105,20 @@ def test_rails_that_pass_an_architectural_singularity_are_told():
     far = dataclasses.replace(guide.guides, travel=np.tile([-0.9, 0.9], (5, 1)))
     report = check(dataclasses.replace(guide, guides=far), rings=1, around=4, levels=2)
     assert [found.name for found in report.findings if not found.passed] == ["least F on the rails, by that at home"]
+
+
+def test_limits_that_the_park_pose_exceeds_are_told(desk):
+    """By hand: the legs at that pose, beside their strokes."""
+    tip, axis = np.array([0.3, 0.0, 0.1]), np.array([0.0, 0.0, -1.0])
+    report = check(dataclasses.replace(desk, park=Park(tip=tip)), rings=1, around=4, levels=2)
+    legs = 1e3 * np.linalg.norm(
+        tip + (desk.tool_length - desk.robot.offsets[:, None]) * axis - desk.robot.base_joints, axis=1
+    )
+    short = {f"park pose, leg {k + 1} shortest": legs[k] for k in np.flatnonzero(legs < 489.0)}
+    failed = {found.name: found.value for found in report.findings if not found.passed}
+    assert short
+    assert {name: failed[name] for name in failed if "shortest" in name} == pytest.approx(short)
+    assert any("base joint" in name for name in failed)
+    good = check(dataclasses.replace(desk, park=Park(tip=desk.work.centre)), rings=1, around=4, levels=2)
+    assert good.passed
+    assert not any("park" in found.name for found in good.findings)

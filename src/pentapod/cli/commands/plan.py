@@ -146,6 +146,7 @@ def shown(
     from pentapod.job.artefacts import PROGRAM, REPORT, SHEET
     from pentapod.job.build.toolpath import Reports, machined_share
     from pentapod.job.outcome import SetUps
+    from pentapod.job.ways.names import FILES as WAYS
     from pentapod.planning import PlacedPath
     from pentapod.planning.diagnosis import active_limits
     from pentapod.timing import Explanation
@@ -169,6 +170,9 @@ def shown(
             setups = outcome.find(SetUps)
             folders = [out] if setups is None else [out / part.folder for part in setups.parts]
             click.echo("\n".join(f"program: {folder / PROGRAM}" for folder in folders))
+            ways = [str(folder / name) for folder in folders for name in WAYS.values() if (folder / name).is_file()]
+            if ways:
+                click.echo(f"from the park pose and back: {', '.join(ways)}")
         click.echo(f"report: {out / REPORT}")
         if refusal is None:
             click.echo(f"set-up sheet: {out / SHEET}")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
@@ -19,38 +17,22 @@ from pentapod.kinematics.robot import Branch
 from pentapod.machine.clearance.leg_clearance import clearances, pair_names
 from pentapod.machine.machine import ARCHITECTURAL_LIMIT, Machine
 from pentapod.machine.report.drives import DriveReport
+from pentapod.machine.report.findings import (
+    LIMB_PARTS,
+    MachineFinding,
+    findings_of_legs,
+    findings_of_limb,
+    findings_of_park,
+    findings_of_rails,
+    in_unit,
+)
 from pentapod.machine.report.softness import Softness
 from pentapod.machine.work_volume import sample_work_volume
 
 AMPLIFICATION_LIMIT = 10.0
 """Tip force → leg forces beyond which `check` calls a machine weak: 100 N of cutting become 1 kN of leg."""
-LIMB_PARTS = ("carriage on its rail", "strut", "strut's joint")
-"""What a passive limb is judged by."""
 LEVELS = 5
 """Heights at which `check` samples the work volume."""
-
-
-@dataclass(frozen=True)
-class MachineFinding(Value):
-    """The worst value of one quantity over the work volume.
-
-    value and limit in `unit`; kind: "at most", "at least" or "more than". where: tip (mm) and tool axis of the worst
-    pose, as text; empty where the value does not depend on the pose.
-    """
-
-    name: str
-    value: float
-    kind: str
-    limit: float
-    unit: str
-    where: str = ""
-
-    @property
-    def passed(self) -> bool:
-        """Whether the value keeps the limit."""
-        if self.kind == "at most":
-            return self.value <= self.limit
-        return self.value >= self.limit if self.kind == "at least" else self.value > self.limit
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +107,7 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = L
 
     nearest = int(np.argmin(np.minimum.reduce(margins)))
     limits = [
-        worst(f"distance to {surface.name}", _in_unit(values, surface.unit), "more than", 0.0, surface.unit)
+        worst(f"distance to {surface.name}", in_unit(values, surface.unit), "more than", 0.0, surface.unit)
         for surface, values in zip(robot.singularities, margins, strict=True)
     ]
     if turn is not None:
@@ -143,14 +125,15 @@ def check(machine: Machine, *, rings: int = 2, around: int = 16, levels: int = L
         clearance_pair=pair,
         branch=one,
         findings=(
-            *_of_legs(machine, lengths, base, platform, worst),
-            *_of_limb(machine, limb, worst),
+            *findings_of_legs(machine, lengths, base, platform, worst),
+            *findings_of_limb(machine, limb, worst),
             MachineFinding("components met", len(met), "at most", 1, "", where(nearest)),
             *limits,
             worst("tip force to leg forces", force, "at most", AMPLIFICATION_LIMIT, "N/N"),
             worst(f"clearance, {pair}", 1e3 * gaps.min(axis=1), "more than", 0.0, "mm"),
             MachineFinding("architectural measure", machine.architecture, "at least", ARCHITECTURAL_LIMIT, ""),
-            *_of_rails(machine),
+            *findings_of_rails(machine),
+            *findings_of_park(machine),
         ),
         drives=DriveReport.of(machine, position, direction, where) if machine.drive_forces.limited else None,
         softness=Softness.of(machine, position, direction, where) if machine.stiffness.given else None,
@@ -166,48 +149,6 @@ def _limb_lines(report: MachineReport) -> list[str]:
         used = f"{least.value:.1f} to {most.value:.1f}{unit} of {least.limit:.0f} to {most.limit:.0f}{unit}"
         lines.append(f"  {name:<35}   {used}")
     return ["", *lines] if lines else []
-
-
-def _in_unit(margin: Floats, unit: str) -> Floats:
-    """Return distances in millimetres or degrees."""
-    return 1e3 * margin if unit == "mm" else np.degrees(margin)
-
-
-def _of_legs(
-    machine: Machine, lengths: Floats, base: Floats, platform: Floats, worst: Callable[..., MachineFinding]
-) -> list[MachineFinding]:
-    """Return the worst values of strokes and joints. lengths, metres, and angles in the joints, radians: (N, n)."""
-    legs, joints, count, found = machine.legs, machine.joints, machine.robot.n_legs, list[MachineFinding]()
-    for k in range(count):
-        low, high = 1e3 * legs.min_length[k], 1e3 * legs.max_length[k]
-        found += [
-            worst(f"leg {k + 1} shortest", 1e3 * lengths[:, k], "at least", low, "mm"),
-            worst(f"leg {k + 1} longest", 1e3 * lengths[:, k], "at most", high, "mm"),
-        ]
-    for k in range(count):
-        cone, (least, most) = np.degrees(joints.base_cone[k]), np.degrees(joints.platform_range[k])
-        seen = np.degrees(platform[:, k])
-        found += [
-            worst(f"leg {k + 1} base joint", np.degrees(base[:, k]), "at most", cone, "deg"),
-            worst(f"leg {k + 1} platform joint, least", seen, "at least", least, "deg"),
-            worst(f"leg {k + 1} platform joint, most", seen, "at most", most, "deg"),
-        ]
-    return found
-
-
-def _of_limb(machine: Machine, at: Floats, worst: Callable[..., MachineFinding]) -> list[MachineFinding]:
-    """Return the worst values of the passive limb, from what it measures in the poses (N, 3)."""
-    limb, found = machine.limb, list[MachineFinding]()
-    if limb is None:
-        return found
-    ranges = (limb.carriage, limb.strut, limb.joint_range)
-    for k, (name, ends, unit) in enumerate(zip(LIMB_PARTS, ranges, ("mm", "mm", "deg"), strict=True)):
-        values, (least, most) = _in_unit(at[:, k], unit), _in_unit(ends, unit)
-        found += [
-            worst(f"{name}, least", values, "at least", least, unit),
-            worst(f"{name}, most", values, "at most", most, unit),
-        ]
-    return found
 
 
 def explain(report: MachineReport) -> str:
@@ -252,7 +193,7 @@ def explain(report: MachineReport) -> str:
         f"  tip force to leg forces               {report.amplification:.2f} N/N",
         f"  smallest clearance                    {1e3 * report.clearance:.1f} mm ({report.clearance_pair})",
         f"  architectural measure                 {m.architecture:.4f}",
-        *(f"  {found.name:<35}   {found.value:.2f}" for found in _of_rails(m)),
+        *(f"  {found.name:<35}   {found.value:.2f}" for found in findings_of_rails(m)),
         *([] if report.softness is None else report.softness.lines()),
         *([] if report.drives is None else report.drives.lines(m)),
         "",
@@ -260,25 +201,12 @@ def explain(report: MachineReport) -> str:
     failed = [finding for finding in report.findings if not finding.passed]
     if not failed:
         return "\n".join([*lines, "The machine keeps its own limits everywhere in its work volume."])
-    lines.append("The machine does not keep its own limits in its work volume:")
+    lines.append("The machine does not keep its own limits:")
     for finding in failed:
         place = f" at {finding.where}" if finding.where else ""
         wanted = f"must be {finding.kind} {finding.limit:.4g}"
         lines.append(f"  {finding.name}: {finding.value:.4g} {finding.unit}, {wanted}{place}")
     return "\n".join(lines)
-
-
-def _of_rails(machine: Machine) -> list[MachineFinding]:
-    """Return whether F of the paper keeps its sign at all ends of the rails, as a share of its value in between.
-
-    On rails along y F is affine in each position: then it keeps its sign everywhere between the ends, too.
-    """
-    guides = machine.guides
-    if guides is None:
-        return []
-    ends = guides.determinant(np.array(list(product(*guides.travel))))
-    home = float(guides.determinant(np.zeros(len(guides.travel))))
-    return [MachineFinding("least F on the rails, by that at home", float((ends / home).min()), "more than", 0.0, "")]
 
 
 def _family(machine: Machine) -> str:
