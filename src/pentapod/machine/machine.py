@@ -27,6 +27,7 @@ from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import (
     Bodies,
     ControllerSettings,
+    Guard,
     JointLimits,
     LegLimits,
     Park,
@@ -46,13 +47,14 @@ ARCHITECTURAL_LIMIT = 0.005
 class Machine(Value):
     """A robot with its limits, bodies, drives and controller.
 
-    tool_length: metres from p (the platform line's origin, where offset = 0) along i to the tool tip.
-    rapid_velocity: largest tip speed on rapids, m/s. drives, masses: programs depend on them only where drive_forces
-    has limits; cutting_force: newtons on the tip, in any direction, that drives with limits keep free on cuts. park:
-    where the machine waits. guides: of a reconfigurable machine, on which the base joints are set before a program
-    runs; rail_positions (n_legs,) metres: where they stand; `robot` is the geometry there. calibration: from which
-    `robot` is the machine as built; None where it is the one that was designed. leg_model: from readings to what drives
-    are told, in posts. limb: the passive limb that holds the platform, where one does.
+    tool_length: metres from p (the platform line's origin, where offset = 0) along i to the tool tip. rapid_velocity:
+    largest tip speed on rapids, m/s. drives, masses: programs depend on them only where drive_forces has limits;
+    cutting_force: newtons on the tip, in any direction, that drives with limits keep free on cuts. park: where the
+    machine waits. guard: what its controller must leave of its limits. guides: of a reconfigurable machine, on which
+    the base joints are set before a program runs; rail_positions (n_legs,) metres: where they stand; `robot` is the
+    geometry there. calibration: from which `robot` is the machine as built; None where it is the one that was designed.
+    leg_model: from readings to what drives are told, in posts. limb: the passive limb that holds the platform, where
+    one does.
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
     spindle's nose would be above the lowest platform joint.
@@ -80,6 +82,7 @@ class Machine(Value):
     stiffness: Stiffness = field(default_factory=Stiffness)
     tool_limits: ToolLimits = field(default_factory=ToolLimits)
     park: Park = field(default_factory=Park)
+    guard: Guard = field(default_factory=Guard)
     guides: ReconfigurablePentapod | None = None
     calibration: CalibrationRecord | None = None
     leg_model: LegModel = field(default_factory=LegModel)

@@ -256,12 +256,8 @@ class Park(Value):
             axis = np.asarray(self.axis, dtype=np.float64)
             length = float(np.linalg.norm(axis))
             if not abs(length - 1.0) < 1e-3:
-                raise MachineError(
-                    "not of unit length",
-                    key="park.axis",
-                    value=axis.tolist(),
-                    expected="a unit vector, [0, 0, -1] upright",
-                )
+                expected = "a unit vector, [0, 0, -1] upright"
+                raise MachineError("not of unit length", key="park.axis", value=axis.tolist(), expected=expected)
             set_frozen(self, axis=frozen(axis / length, "park.axis", (3,)))
 
     @property
@@ -270,3 +266,21 @@ class Park(Value):
         if self.tip is None:
             return None
         return self.tip, np.array([0.0, 0.0, -1.0]) if self.axis is None else self.axis
+
+
+@dataclass(frozen=True)
+class Guard(Value):
+    """What the kinematics of a controller must leave in every pose, beyond the machine's own limits.
+
+    w: sine of the angle between tool axis and base plane. surface, stroke, leg_gap, shaft_gap: metres, to the singular
+    surface S = 0, to the ends of strokes, between legs, and from a leg to the spindle. Programs do not depend on it.
+    """
+
+    w: Annotated[float, Key("", "least sine of the angle between tool axis and base plane", ge=0.0, lt=1.0)] = 0.1
+    surface: Annotated[float, Key("mm", "least way to the singular surface S = 0", ge=0.0)] = 0.020
+    stroke: Annotated[float, Key("mm", "least way of a leg to an end of its stroke", ge=0.0)] = 0.0
+    leg_gap: Annotated[float, Key("mm", "least gap between two legs", ge=0.0)] = 0.001
+    shaft_gap: Annotated[float, Key("mm", "least gap between a leg and the spindle", ge=0.0)] = 0.001
+
+    def __post_init__(self) -> None:
+        check_fields(self, MachineError)

@@ -27,6 +27,7 @@ from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import (
     Bodies,
     ControllerSettings,
+    Guard,
     JointLimits,
     JointStiffness,
     LegLimits,
@@ -144,6 +145,7 @@ def _fields(tables: Any, file: str | Path) -> dict[str, Any]:
         "controller": ControllerSettings(**fields_from(ControllerSettings, tables.controller)),
         "work": WorkVolume(**fields_from(WorkVolume, tables.work)),
         "park": Park(**fields_from(Park, tables.park)),
+        "guard": Guard(**fields_from(Guard, tables.guard)),
         "drives": Drives(**fields_from(Drives, tables.drives)),
         "drive_forces": DriveForces(**fields_from(DriveForces, tables.drives)),
         "masses": Masses(**fields_from(Masses, tables.masses)),

@@ -18,6 +18,7 @@ from pentapod.machine.leg_model import LegModel
 from pentapod.machine.parts import (
     Bodies,
     ControllerSettings,
+    Guard,
     JointLimits,
     JointStiffness,
     LegLimits,
@@ -84,6 +85,7 @@ PARTS: dict[str, tuple[type, ...]] = {
     "controller": (ControllerSettings,),
     "work": (WorkVolume,),
     "park": (Park,),
+    "guard": (Guard,),
     "drives": (Drives, DriveForces),
     "masses": (Masses,),
 }

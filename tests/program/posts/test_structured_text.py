@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 
 import numpy as np
@@ -12,9 +13,9 @@ from pentapod.base.errors import MachineError
 from pentapod.cli.main import run
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine import Machine
+from pentapod.machine.parts import Guard
 from pentapod.planning.limits.margins import Margins
 from pentapod.program.posts.codesys.structured_text import structured_text
-from pentapod.program.posts.linuxcnc.module import LEAST
 from structured_text import Translated, translated
 
 MM = 1e3
@@ -59,7 +60,8 @@ def test_structured_text_equals_the_robot_on_a_million_poses(name, tmp_path):
 
 @compiled
 def test_structured_text_refuses_what_is_beyond_the_margins_of_the_planner(tmp_path):
-    machine = calibrated(4, 0.012)
+    guard = Guard(w=0.2, surface=0.05, stroke=0.01, leg_gap=0.003, shaft_gap=0.002)
+    machine = dataclasses.replace(calibrated(4, 0.012), guard=guard)
     p, i = poses(machine, 2000)
     _, margins, good = Translated(structured_text(machine), tmp_path).inverses(world_of(machine, p, i))
     planner = Margins.of(machine, COMPONENTS[0])
@@ -71,7 +73,7 @@ def test_structured_text_refuses_what_is_beyond_the_margins_of_the_planner(tmp_p
     for k, (words, unit) in enumerate(kinds):
         columns = [c for c, limit in enumerate(planner.own_limits) if words in limit.name]
         assert np.abs(unit * own[:, columns].min(axis=1) - margins[:, k]).max() < 1e-8, words
-    least = [LEAST.w, LEAST.surface_mm, 0.0, 0.0, 0.0, LEAST.leg_gap_mm, LEAST.shaft_gap_mm]
+    least = [0.2, 50.0, 10.0, 0.0, 0.0, 3.0, 2.0]
     assert (good == (margins >= least).all(axis=1)).all()
     assert 0.05 < good.mean() < 0.95
 

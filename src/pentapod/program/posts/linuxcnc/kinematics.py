@@ -30,7 +30,7 @@ from pentapod.program.posts.linuxcnc.config import (
     number,
     servo_period_ns,
 )
-from pentapod.program.posts.linuxcnc.module import LEAST, Module, module_files, nominal_robot
+from pentapod.program.posts.linuxcnc.module import Module, module_files, nominal_robot
 from pentapod.toolpath.formats import FORMATS
 from pentapod.toolpath.formats.rotary import AB
 from pentapod.toolpath.toolpath import Toolpath
@@ -112,16 +112,16 @@ def upright_component(machine: Machine) -> Branch:
 def nearer_than_least(machine: Machine, component: Branch, path: Toolpath) -> str:
     """Return what the module would refuse of a toolpath in the machine frame, a sentence; "" where it takes all.
 
-    A program that was judged keeps the machine's limits, but may be nearer to singular surfaces than `LEAST`.
+    A program that was judged keeps the machine's limits, but may be nearer to singular surfaces than its guard allows.
     """
-    margins = Margins.of(machine, component)
+    margins, guard = Margins.of(machine, component), machine.guard
     left = margins.own(path.tips, path.axes).min(axis=0)
     found: list[str] = []
     for limit, margin in zip(margins.own_limits, left.tolist(), strict=True):
         room = margin * getattr(limit, "comfort", 1.0)
         for words, pin, least, unit in (
-            ("w = 0", "w", LEAST.w, 1.0), ("S = 0", "surface", LEAST.surface_mm, 1e3),
-            ("legs", "leg-gap", LEAST.leg_gap_mm, 1e3), ("spindle", "shaft-gap", LEAST.shaft_gap_mm, 1e3),
+            ("w = 0", "w", guard.w, 1.0), ("S = 0", "surface", 1e3 * guard.surface, 1e3),
+            ("legs", "leg-gap", 1e3 * guard.leg_gap, 1e3), ("spindle", "shaft-gap", 1e3 * guard.shaft_gap, 1e3),
         ):  # fmt: skip
             if words in limit.name and unit * room < least:
                 found.append(f"`pentapod.least.{pin}` (it has {unit * room:.4g}, {least:g} is asked)")

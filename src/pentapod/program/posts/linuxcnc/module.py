@@ -33,23 +33,6 @@ SOURCES = ("pentapod_kinematics.h", "pentapod_kins.c", "pins_2.9.h", "pins_dev.h
 
 
 @dataclass(frozen=True)
-class LeastMargins:
-    """What must be left in every pose, beyond the machine's own limits; in the order of the module's margins.
-
-    w: sine of the angle between tool axis and base plane. surface_mm: to the singular surface S = 0. stroke_mm: of each
-    leg. base_cone, platform_joint: differences of cosines. leg_gap_mm, shaft_gap_mm: between legs, and to the spindle.
-    """
-
-    w: float = 0.1
-    surface_mm: float = 20.0
-    stroke_mm: float = 0.0
-    base_cone: float = 0.0
-    platform_joint: float = 0.0
-    leg_gap_mm: float = 1.0
-    shaft_gap_mm: float = 1.0
-
-
-@dataclass(frozen=True)
 class GuardOptions:
     """How the guard foresees where a motion stops.
 
@@ -64,7 +47,6 @@ class GuardOptions:
     slack: float = 0.01
 
 
-LEAST = LeastMargins()
 GUARD = GuardOptions()
 
 
@@ -88,7 +70,9 @@ def module_files(given: Module) -> dict[str, bytes]:
 
 def module_values(given: Module) -> dict[str, ArrayLike]:
     """Return the numbers of the mathematics by name, mm. Raises MachineError where the machine can have no module."""
-    least = [getattr(LEAST, item.name) for item in fields(LEAST)]
+    guard = given.machine.guard
+    # In the order of the module's margins; those of the cones are differences of cosines.
+    least = [guard.w, *(1e3 * np.array([guard.surface, guard.stroke, 0.0, 0.0, guard.leg_gap, guard.shaft_gap]))]
     return {**_design(given), **_as_it_is(given.machine), **_limits(given.machine), **_pairs(given), "LEAST": least}
 
 
