@@ -38,7 +38,7 @@ def test_wrong_values_are_one_error_about_the_key(make_job, tmp_path, capsys, ch
     error = capsys.readouterr().err
     assert said in error
     assert len(error.splitlines()) == 1
-    assert not (tmp_path / "out" / "program.csv").exists()
+    assert not (tmp_path / "out").exists()
 
 
 def test_several_jobs_are_planned_one_after_the_other(make_job, tmp_path, capsys):

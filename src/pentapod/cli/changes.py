@@ -28,6 +28,23 @@ def changed(job: Job, changes: Sequence[str], folder: Path) -> Job:
     return write_job(job, content, folder / CHANGED_JOB, f"with {', '.join(changes)}")
 
 
+def written_before(folder: Path) -> bytes | None:
+    """Return the job with other values that a run's folder has already."""
+    file = folder / CHANGED_JOB
+    return file.read_bytes() if file.is_file() else None
+
+
+def withdraw(folder: Path, before: bytes | None) -> None:
+    """Leave a run's folder as it was before `changed`: with its job of then, or without; no empty folder stays."""
+    file = folder / CHANGED_JOB
+    if before is not None:
+        file.write_bytes(before)
+    elif file.is_file():
+        file.unlink()
+        if not any(folder.iterdir()):
+            folder.rmdir()
+
+
 def _parsed(text: str) -> tuple[str, Any]:
     """Return the path of a key and its value."""
     import tomllib

@@ -20,6 +20,9 @@ LINE_EVERY_S = 5.0
 FIRST_SHARE = 0.02
 """Share of a stage from which the time that is left is told."""
 
+GROWN = 1.2
+"""Estimate of the time that is left, by the least one told before, from which it is not told any more."""
+
 
 @contextmanager
 def progress_bar(*, quiet: bool) -> Generator[Progress]:
@@ -44,20 +47,22 @@ class Lines:
 
     def __init__(self, echo: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
         self.echo, self.clock = echo, clock
-        self.stage, self.began, self.told = "", clock(), clock()
+        self.stage, self.began, self.told, self.left = "", clock(), clock(), float("inf")
 
     def __call__(self, stage: str, fraction: float, note: str = "") -> None:
         """Print a line if it is time."""
         now = self.clock()
         if stage != self.stage:
-            self.stage, self.began = stage, now
+            self.stage, self.began, self.left = stage, now, float("inf")
         if now - self.told < LINE_EVERY_S:
             return
         self.told, seconds = now, now - self.began
-        share = f" {100.0 * fraction:.0f} %" if fraction > 0.0 else f", {seconds:.0f} s so far"
-        left = seconds * (1.0 - fraction) / fraction if fraction >= FIRST_SHARE else None
-        more = "" if left is None or seconds == 0.0 else f", about {left:.0f} s left"
-        self.echo(f"{stage}{share}{more}{f': {note}' if note else ''}")
+        share = f" {100.0 * fraction:.0f} %" if fraction > 0.0 else ""
+        left = seconds * (1.0 - fraction) / fraction if fraction >= FIRST_SHARE else float("inf")
+        # An estimate that grows was wrong: then only what has passed is told.
+        more = f"about {left:.0f} s left" if left < GROWN * self.left and seconds > 0.0 else f"{seconds:.0f} s so far"
+        self.left = min(left, self.left)
+        self.echo(f"{stage}{share}, {more}{f': {note}' if note else ''}")
 
 
 @contextmanager

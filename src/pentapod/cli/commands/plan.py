@@ -111,9 +111,10 @@ def _each(jobs: tuple[Path, ...], asked: Asked) -> tuple[int, Any]:
 def _planned(path: Path, asked: Asked) -> tuple[int, dict[str, Any] | None]:
     """Plan one job and print what became of it; return the exit code, and what JSON says."""
     from pentapod.base.errors import InputError
-    from pentapod.cli.changes import changed
+    from pentapod.cli.changes import changed, withdraw, written_before
     from pentapod.job.schema.job import Job
 
+    before = written_before(asked.out)
     job = changed(Job.load(path), asked.changes, asked.out)
 
     from pentapod.job.advice.options import AdviceOptions
@@ -132,6 +133,7 @@ def _planned(path: Path, asked: Asked) -> tuple[int, dict[str, Any] | None]:
                 job, asked.out, progress, writers={REPORT: _write_report, SHEET: _write_sheet}, advice=options
             )
     except InputError as error:
+        withdraw(asked.out, before)
         if options is None or not can_help(error) or (asked.advice is None and error.key == "part.unit"):
             raise
         click.echo(f"error: {error}", err=True)  # at once: the search takes as long as a plan or two

@@ -86,6 +86,7 @@ def advised(
     count, interrupted = options.replans if failed else options.plans, False
     ended: list[str | None] = [None]
     shown = _Shown(progress, count)
+    progress("advice", 0.0, "changes of the job are tried; Ctrl-C ends the search")
 
     def tell(words: str) -> None:
         if words:

@@ -147,11 +147,12 @@ def checks(run: PlannedRun, digest: str) -> list[str]:
     done.append("Part: size and raw side as above, clean seat.")
     if run.stand.is_tilted and run.table is None:
         done.append(f"Wedge of {words_of(np.degrees(run.stand.lean))}° under the part, low side as drawn.")
-    done.append("Clamps outside the tool path, and below the legs." + (" Fixture as drawn." if run.held else ""))
-    done.append("Three touch-off points agree; else: pentapod register, replan.")
+    judged = "Fixture as drawn." if run.held else "The job names no fixture: nothing has judged the clamps."
+    done.append(f"Clamps outside the tool path, and below the legs. {judged}")
+    done.append("At the three touch-off points the tool just touches; else: pentapod register, replan.")
     done.append("Way from the present pose to the first one is free.")
     done.append(f"SHA-256 of program.csv begins with {digest[:12]}.")
-    done.append("Dry run above the part, feed override at 10 %; hand at the stop.")
+    done.append("Dry run without the part, at 10 % of the pace; hand at the stop.")
     return done
 
 
