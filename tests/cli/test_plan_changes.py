@@ -22,6 +22,15 @@ def test_other_values_are_planned_and_their_job_is_kept(make_job, tmp_path, caps
     assert "FAIL  job" in capsys.readouterr().out
 
 
+def test_a_part_far_outside_the_work_volume_is_told(make_job, tmp_path, capsys):
+    """A table's height is easily mistyped, and the machine may still reach the part."""
+    job, told = make_job(), "outside the machine's work volume"
+    assert run(["plan", str(job), "-o", str(tmp_path / "a")]) == 0
+    assert told not in capsys.readouterr().out
+    assert run(["plan", str(job), "-o", str(tmp_path / "b"), "--set", "placement.position_mm=[85, -17, 330]"]) == 0
+    assert told in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

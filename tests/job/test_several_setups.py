@@ -160,10 +160,10 @@ def test_verdict_and_report_of_several_set_ups_name_all(done):
 def test_the_set_up_sheet_has_a_page_for_each(done, tmp_path):
     out, _ = done
     sheet = (out / "sheet.html").read_text()
-    assert re.findall(r"<h1>([^<]*)</h1>", sheet) == ["job, set-up 1", "job, set-up 2"]
+    assert re.findall(r"<h1>([^<]*)</h1>", sheet) == [f"{out.parent.name}, set-up 1", f"{out.parent.name}, set-up 2"]
     own = [(out / folder / "sheet.html").read_text() for folder in ("setup-1", "setup-2")]
     for number, page in enumerate(own, start=1):
-        assert re.findall(r"<h1>([^<]*)</h1>", page) == [f"job, set-up {number}"]
+        assert re.findall(r"<h1>([^<]*)</h1>", page) == [f"{out.parent.name}, set-up {number}"]
         legs = read_csv(out / f"setup-{number}" / "program.csv").legs[0]
         assert ", ".join(f"{1e3 * leg:.3f}" for leg in legs) in page
     assert own[0] != own[1]

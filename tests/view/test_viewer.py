@@ -132,7 +132,7 @@ def test_touch_off_points_of_a_placement(viewer, opened):
     """The tool there is where the forward kinematics puts it, and the points are the report's, moved with the part."""
     placement = shifted(opened.placement, 0.01, -0.02, 0.005)
     found = ask(viewer, "touch-off", at(placement))
-    assert found["name"] == "job-touch-off.csv"
+    assert found["name"] == f"{opened.folder.parent.name}-touch-off.csv"
     rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(io.StringIO(found["text"]))]
     assert len(rows) == 3
     machine = opened.machine

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from pathlib import Path
 
 from pentapod.base.refusal import Refusal
+from pentapod.base.units import from_si
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.job.build.limits import placement_limits
 from pentapod.job.build.placed_check import Ranges, meetings, refusal_of
@@ -16,6 +18,7 @@ from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import INTERRUPTED, StageRunner
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
+from pentapod.machine.parts import WorkVolume
 from pentapod.planning import LegPath, PlacedPath, Placement, leg_path, plan
 from pentapod.planning.leg_path.tolerances import tolerances_beside
 from pentapod.planning.placement.common_axes import FIXED
@@ -36,6 +39,9 @@ UPRIGHT = "the tool does not lean, because it would touch the part"
 STRAIGHT = "the tool keeps one direction, because it would touch the part"
 """What is said of a placement with one axis everywhere."""
 
+FAR_OUTSIDE = 0.5
+"""Distance of a path from the work volume, by the volume's diameter, beyond which it is told."""
+
 
 def explanation(
     path: LegPath, trajectory: Trajectory, program: Program, machine: Machine, toolpath: Toolpath
@@ -51,8 +57,11 @@ def explanation(
     return explain(trajectory, machine, uses, slow)
 
 
-def placement_remarks(placed: PlacedPath | Refusal) -> str:
-    """Return the positions of guides, a common direction of the tool, and what the choice of placement has to tell."""
+def placement_remarks(placed: PlacedPath | Refusal, work: WorkVolume) -> str:
+    """Return the positions of guides, a common direction of the tool, and what the choice of placement has to tell.
+
+    A path far outside the work volume is no error where it keeps all limits; but a height may be mistyped.
+    """
     if isinstance(placed, Refusal):
         return ""
     chosen = placed.placement
@@ -60,6 +69,12 @@ def placement_remarks(placed: PlacedPath | Refusal) -> str:
     lines += [f"tool axis: {placed.common_axis}; {placed.lean}"] if placed.common_axis is not None else []
     if any(word in chosen.chosen_by for word in (INTERRUPTED, UPRIGHT, STRAIGHT)):
         lines.append(f"placement: {chosen.chosen_by}; smallest margin {placed.smallest_margin:.3f}")
+    outside = work.outside(placed.tips)
+    if outside > FAR_OUTSIDE * work.diameter:
+        far = f"{from_si(outside, 'mm'):.0f} mm"
+        lines.append(
+            f"  note: the path is up to {far} outside the machine's work volume; is its place, or table_z_mm, right?"
+        )
     return "\n".join(lines)
 
 
@@ -100,7 +115,8 @@ class Task:
         """Plan, write the program to `file` and return it; or return the first refusal."""
         placed = self.placed
         if placed is None:
-            placed = self.runner.run("placement", self._placed, remark=placement_remarks)
+            told = partial(placement_remarks, work=self.machine.work)
+            placed = self.runner.run("placement", self._placed, remark=told)
         if isinstance(placed, Refusal):
             return placed
         return self.on(placed.placement).written(placed, file)

@@ -226,6 +226,11 @@ class WorkVolume(Value):
         set_frozen(self, centre=frozen(self.centre, "centre", (3,)))
         check_fields(self, MachineError)
 
+    def outside(self, tips: Floats) -> float:
+        """Return how far tips (N, 3) are outside the cylinder, across or along z, at most; 0 where all are inside."""
+        across, along = np.linalg.norm((tips - self.centre)[:, :2], axis=1), np.abs((tips - self.centre)[:, 2])
+        return float(max((across - 0.5 * self.diameter).max(), (along - 0.5 * self.height).max(), 0.0))
+
 
 @dataclass(frozen=True, eq=False)
 class Park(Value):

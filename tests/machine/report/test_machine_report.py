@@ -15,6 +15,13 @@ def desk():
     return Machine.load("desk")
 
 
+def test_distance_to_the_work_volume_is_across_or_along_it():
+    volume = WorkVolume(np.array([0.1, -0.2, 0.5]), 0.2, 0.06, np.radians(30))
+    assert volume.outside(np.array([[0.1, -0.2, 0.5], [0.19, -0.2, 0.529]])) == 0.0
+    assert volume.outside(np.array([[0.1, -0.2, 0.5], [0.25, -0.2, 0.5]])) == pytest.approx(0.05)
+    assert volume.outside(np.array([[0.1, -0.2, 0.2]])) == pytest.approx(0.27)
+
+
 def test_sample_covers_the_boundary_and_stays_inside():
     volume = WorkVolume(np.array([0.1, -0.2, 0.5]), 0.2, 0.06, np.radians(30))
     tips, axes = sample_work_volume(volume, rings=2, around=8, levels=3)

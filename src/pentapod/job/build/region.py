@@ -37,7 +37,7 @@ class RegionReport(Value):
         found = self.share
         text = f"region: {_percent(found.inside)} of the surface"
         if found.facing < 1.0:
-            text += f", {_percent(found.inside / max(found.facing, 1e-300))} of what faces its direction"
+            text += f", {_percent(min(found.inside / max(found.facing, 1e-300), 1.0))} of what faces its direction"
         return "\n".join([text, *(f"  problem: {problem}" for problem in self.problems)])
 
 
@@ -80,7 +80,8 @@ def region_report(job: Job, mesh: Mesh) -> RegionReport:
         raise ToolpathError("the region holds nothing to machine", key="region", remedy=why_empty(mesh, region))
     if found.inside < LEAST_SHARE * found.facing:
         outside, steep = (found.facing - found.boxed) / found.facing, (found.boxed - found.inside) / found.facing
-        why = [f"{_percent(outside)} is outside region_box_mm"] if job.part.region_box_mm is not None else []
+        boxed = f"{_percent(outside)} is outside region_box_mm (placement.setups takes a large part in several set-ups)"
+        why = [boxed] if job.part.region_box_mm is not None else []
         degrees = from_si(region.within, "deg")
         why += [f"{_percent(steep)} is steeper than region_angle_deg = {degrees:g}"] if steep > 0.0 else []
         problems.append(f"less than half of what faces the direction is machined: {' and '.join(why)}")

@@ -14,6 +14,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.refusal import Refusal, Shortfall
+from pentapod.base.units import from_si, to_si
 from pentapod.geometry.directions import angle_between, turned
 from pentapod.job.build.placed_check import meetings
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
@@ -50,7 +51,7 @@ class RouteOptions:
     retracts: tuple[float, ...] = (0.0, 0.005, 0.015, 0.04)
     heights: tuple[float, ...] = (0.0, 0.01, 0.03, 0.08)
     step: float = 2e-3
-    turn: float = float(np.radians(1.0))
+    turn: float = float(to_si(1.0, "deg"))
 
 
 OPTIONS = RouteOptions()
@@ -104,13 +105,13 @@ def route(
         cause = f"{NOT_CLEAR}: on every one the tool touches the part"
         return Refusal(name, cause, remedy=_remedy(park))
     worst = int(best[1].min(axis=1).argmin())
-    x, y, z = 1e3 * best[2].tips[worst]
+    x, y, z = from_si(best[2].tips[worst], "mm")
     cause = f"{NOT_CLEAR}; on the nearest to one the least room is at x {x:.1f}, y {y:.1f}, z {z:.1f} mm of the tip"
     return _refused(name, cause, best[1], margins, _remedy(park), least)
 
 
 def _remedy(park: Pose) -> str:
-    x, y, z = 1e3 * park[0]
+    x, y, z = from_si(park[0], "mm")
     where = f"now {x:.6g}, {y:.6g}, {z:.6g}"
     return f"Choose a park.tip_mm ({where}) that the tool reaches more freely, or move the part or its fixture"
 
