@@ -14,7 +14,7 @@ from pentapod.machine.machine import Machine
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.program.program import Program
 from pentapod.toolpath.linking.partition import Piece
-from pentapod.verify.claims.pieces import WHOLE
+from pentapod.verify.claims.set_up import WHOLE
 from pentapod.verify.verdict.verdict import NO_SOURCES, Certificate, Place, Sources, Verdict
 
 T = TypeVar("T")

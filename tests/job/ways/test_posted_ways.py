@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -121,9 +122,14 @@ def test_a_restart_without_a_clear_way_in_is_refused(parked, tmp_path, capsys, m
     monkeypatch.setattr(middle, "job_machine", lambda _: in_the_part)
     posted(*words, code=1)
     assert "refused: way in: the park pose is not within the limits" in capsys.readouterr().err
+    posted(*words[:7], "--json", code=1)
+    assert json.loads(capsys.readouterr().out)["refusal"].startswith("way in: the park pose")
     monkeypatch.setattr(middle, "job_machine", lambda _: replace(machine, park=Park()))
     posted(*words, code=2)
     assert "park.tip_mm" in capsys.readouterr().err
+    for option in ("--no-ways", "--unverified", "--machine=desk"):
+        posted(*words, option, code=2)
+        assert f"{option.split('=')[0]} does not go with it" in capsys.readouterr().err
     posted(*words[:5], "--from", "soon", code=2)
     assert "not a time" in capsys.readouterr().err
     assert not (tmp_path / "post").exists()

@@ -166,6 +166,18 @@ def test_other_programs_are_no_runs_of_this_one(reference) -> None:
         compare(log_of(np.arange(len(legs)) * 1e-3, 1e-3 * legs), reference)
 
 
+def test_a_path_that_comes_near_for_a_moment_is_no_run(reference) -> None:
+    """Long logs of another program, or of exchanged columns, cross the path somewhere."""
+    legs = lengths_at(reference.program, np.arange(1000, 1250) * 1e-3)
+    away = 0.05 * np.sin(np.linspace(0.0, 0.5 * np.pi, 400))[:, None] * np.array([1.0, -0.8, 0.9, -0.7, 0.6])
+    long = np.repeat(away[-1:], 4000, axis=0)
+    near = np.concatenate([legs[:1] + long, legs[:1] + away[::-1], legs, legs[-1:] + away, legs[-1:] + long])
+    with pytest.raises(InputError, match="not a run of this program"):
+        compare(log_of(np.arange(len(near)) * 1e-3, near), reference)
+    alone = compare(log_of(np.arange(len(legs)) * 1e-3, legs), reference)  # a log cut to its run is one
+    assert alone.covered == pytest.approx((1.0, 1.25), abs=0.05)
+
+
 def test_simulated_drives_are_measured_as_the_simulation_measures_them(reference) -> None:
     drives = dataclasses.replace(reference.machine.drives, velocity_feedforward=0.9, ripple_force=0.0)
     slow = Reference(reference.program, dataclasses.replace(reference.machine, drives=drives))

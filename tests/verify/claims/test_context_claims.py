@@ -11,9 +11,8 @@ from pentapod.kinematics import Component
 from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.verify import verify
-from pentapod.verify.claims.pieces import whole
-from pentapod.verify.claims.placement import placement
 from pentapod.verify.claims.provenance import component, controller
+from pentapod.verify.claims.set_up import placement, whole
 
 PLACED = RigidTransform(np.diag([1.0, -1.0, -1.0]), np.array([0.01, -0.02, 0.3]))
 

@@ -75,6 +75,17 @@ def post(
     --from they are planned anew from the last waypoint passed at that time; it is refused where no way in is clear.
     """
     if begin is not None:
+        others = {
+            "--no-ways": no_ways,
+            "--unverified": unverified,
+            "--machine": machine,
+            "--plan": plan,
+            "--verdict": verdict,
+        }
+        if wrong := [option for option, value in others.items() if value]:
+            raise click.UsageError(
+                f"--from plans and judges anew, from the park pose and back: {wrong[0]} does not go with it"
+            )
         return _restarted(program, begin, name, out, job, as_json=as_json, quiet=quiet)
     from pentapod.base.files import sha256_of
     from pentapod.job.artefacts import ARRAYS, VERDICT
@@ -149,6 +160,8 @@ def _restarted(program: Path, begin: str, name: str, out: Path, job: Path | None
                 what, remedy = "this format is the toolpath, not the rows", "choose a format of rows, such as csv"
                 raise InputError(what, key="--to", value=name, remedy=remedy) from error
     if isinstance(found, Refusal) or files is None:
+        if as_json:
+            echo_json({"format": name, "refusal": str(found)})
         click.echo(f"refused: {found}", err=True)
         return 1
     click.echo(f"note: it begins where the program was at {found.begins:.3f} s, waypoint {found.waypoint}", err=True)

@@ -18,7 +18,15 @@ if TYPE_CHECKING:
 ALLOWED = 1.0 + 1e-5
 """Share of a limit: lengths of programs are rounded, and their third differences show it."""
 
-PATH_M, AFTER_S, LEAST, MOST = 1e-6, 5.0, 5.0, 120.0
+PATH_M = 1e-6
+"""Metres by which a leg may be off the program's path."""
+
+AFTER_S = 5.0
+"""Seconds that are played beyond what the changes ask for."""
+
+LEAST, MOST = 5.0, 120.0
+"""Percent of the pace that may be asked for."""
+
 EXPECTED = f"SECONDS:PERCENT with {LEAST:g} to {MOST:g} %, or SECONDS:hold, :resume, :abort, in the order of time"
 
 

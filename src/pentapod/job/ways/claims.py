@@ -12,8 +12,9 @@ import numpy as np
 from pentapod.base.errors import InputError
 from pentapod.base.files import sha256_of
 from pentapod.job.ways.names import FILES, IN
-from pentapod.job.ways.ways import SAME_QUANTA, park_row, specification_of_way
+from pentapod.job.ways.ways import park_row, specification_of_way
 from pentapod.program import Program, read_csv
+from pentapod.program.joined import SAME_ROW
 from pentapod.verify import Claim, Place, Replay, Specification, judged
 from pentapod.verify.replay.claim import MM, Finding, Idle
 
@@ -67,7 +68,7 @@ def judge_way(replay: Replay, *, way: Program, inward: bool) -> Finding:
         method = f"it {own} away from the park pose: the leg that is farthest off"
         return Finding(False, MM * off, MM * MISPLACED, "mm", _place(way, row), method)
     off = float(np.abs(legs[-1] - program.legs[0 if inward else -1]).max())
-    if not off <= SAME_QUANTA:
+    if not off <= SAME_ROW:
         method = f"it {other} away from the program's {'first' if inward else 'last'} row: the leg that is farthest off"
         return Finding(False, MM * off, 0.0, "mm", _place(way, len(way.legs) - 1 - row), method)
     verdict = judged(way, specification_of_way(way, replay.specification))

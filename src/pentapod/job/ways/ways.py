@@ -18,12 +18,10 @@ from pentapod.machine.machine import Machine
 from pentapod.planning import PlacedPath, leg_path
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.program import Program, sample, write_csv
+from pentapod.program.joined import SAME_ROW
 from pentapod.timing import Limit, Trajectory, retime
 from pentapod.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import Coverage, Specification
-
-SAME_QUANTA = 2e-11
-"""Metres by which the end of a way may be off the row where it meets the program, before it is set to that row."""
 
 APART = 5e-6
 """Metres, or radians times the tool's length, between the poses of a way that count as its toolpath."""
@@ -145,6 +143,6 @@ def _way(name: str, trajectory: Trajectory, program: Program, machine: Machine) 
     way = sample(trajectory, machine, program.placement, program.component, source)
     end, row = (-1, program.legs[0]) if name == IN else (0, program.legs[-1])
     legs = way.legs.copy()
-    if np.abs(legs[end] - row).max() <= SAME_QUANTA:
+    if np.abs(legs[end] - row).max() <= SAME_ROW:
         legs[end] = row
     return replace(way, legs=legs)

@@ -29,9 +29,9 @@ class AlignOptions:
     squares) up to which places are near; the next one counts where it matches the whole program, or `more` times as
     much of the log: ways to and from the program come near it, too. fastest: most steps of the program in one of the
     log. even: metres, what a step more or less than one counts as. cells: of the search at most. least: seconds of a
-    program that a log must have at least. in_time: seconds by which a run may be early or late and still is compared in
-    time. moving: share of the program's median speed from which it counts as moving. unit: ratio of lengths from which
-    the unit of a log is wrong.
+    program that a log must have at least. share: of the log's rows or of the program, that must be matched. in_time:
+    seconds by which a run may be early or late and still is compared in time. moving: share of the program's median
+    speed from which it counts as moving. unit: ratio of lengths from which the unit of a log is wrong.
     """
 
     step: float = 8e-3
@@ -41,6 +41,7 @@ class AlignOptions:
     even: float = 2e-6
     cells: int = 40_000_000
     least: float = 0.2
+    share: float = 0.1
     in_time: float = 0.03
     moving: float = 0.1
     unit: float = 3.0
@@ -82,7 +83,9 @@ def align(log: RunLog, program: Program, options: AlignOptions = DEFAULTS) -> Al
         if followed is not None and _whole(followed, program):
             break
     covered = 0.0 if followed is None else float(np.ptp(followed[1])) * program.period
-    if followed is None or covered < min(options.least, 0.5 * program.duration):
+    matched = 0.0 if followed is None else float(np.ptp(followed[0])) / len(log.times)
+    by_chance = max(matched, covered / program.duration) < options.share  # paths of other programs come near it, too
+    if followed is None or covered < min(options.least, 0.5 * program.duration) or by_chance:
         low, high = _ranges(log.legs), _ranges(program.legs)
         raise InputError(
             "not a run of this program: the legs are nowhere near its path for long", file=log.file,

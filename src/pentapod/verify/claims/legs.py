@@ -1,16 +1,15 @@
-"""Claims about each leg: length, rate, acceleration, jerk, exact on the controller's polynomials, and forces."""
+"""Claims about each leg: length, rate, acceleration and jerk, exact on the controller's polynomials."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.verify.replay.claim import MM, TOLERATED, Claim, Finding, Idle
+from pentapod.verify.replay.claim import MM, TOLERATED, Claim, Finding
 from pentapod.verify.replay.interval_bounds import RunningMaximum
 from pentapod.verify.replay.replay import Replay
 from pentapod.verify.verdict.verdict import Place
 
-_NO_FORCES = "the machine says nothing of the forces of its drives"
 _EXACT = "exact extreme values of the controller's polynomials, at the rows and between them"
 
 
@@ -19,7 +18,7 @@ def shortest(replay: Replay) -> Finding:
     found, limit = replay.interval_bounds.shortest, replay.machine.legs.min_length
     leg = int(np.argmin(-found.values - limit))
     value, bound = -float(found.values[leg]), float(limit[leg])
-    where, method = _place(replay, found, leg), _method(leg, _EXACT)
+    where, method = _place(replay, found, leg), nearest_leg(leg, _EXACT)
     return Finding(value >= bound, MM * value, MM * bound, "mm", where, method, at_least=True)
 
 
@@ -28,7 +27,7 @@ def longest(replay: Replay) -> Finding:
     found, limit = replay.interval_bounds.longest, replay.machine.legs.max_length
     leg = int(np.argmax(found.values - limit))
     value, bound = float(found.values[leg]), float(limit[leg])
-    return Finding(value <= bound, MM * value, MM * bound, "mm", _place(replay, found, leg), _method(leg, _EXACT))
+    return Finding(value <= bound, MM * value, MM * bound, "mm", _place(replay, found, leg), nearest_leg(leg, _EXACT))
 
 
 def rate(replay: Replay) -> Finding:
@@ -58,48 +57,21 @@ def jerk(replay: Replay) -> Finding:
     return _below(replay, replay.interval_bounds.jerks, replay.machine.legs.max_jerk, "mm/s³", method)
 
 
-def force(replay: Replay) -> Finding | Idle:
-    """Judge the force that each drive needs at the rows against what it has there."""
-    if not replay.machine.drive_forces.limited:
-        return Idle(_NO_FORCES)
-    forces = replay.forces
-    row, leg = np.unravel_index(int((forces.asked / forces.available).argmax()), forces.asked.shape)
-    value, bound = float(forces.asked[row, leg]), float(forces.available[row, leg])
-    method = f"inverse dynamics of the machine's masses at the rows, {_parts(replay)}; {TOLERATED}"
-    return Finding.at_most(value, bound, 1.0, "N", replay.place(2 * int(row)), _method(int(leg), method))
-
-
-def continuous_force(replay: Replay) -> Finding | Idle:
-    """Judge the root mean square of each drive's force over the whole program."""
-    limit = replay.machine.drive_forces.continuous_force
-    if not np.isfinite(limit).any():
-        return Idle("the machine says nothing of the force that its drives bear all the time")
-    forces = replay.forces
-    mean = np.sqrt(np.square(np.abs(forces.push) + forces.cutting).mean(axis=0))
-    leg = int(np.argmax(mean / limit))
-    row = int(np.argmax(np.abs(forces.push[:, leg]) + forces.cutting[:, leg]))
-    method = f"root mean square over all rows of the force by the machine's masses, {_parts(replay)}; {TOLERATED}"
-    where = replay.place(2 * row)
-    return Finding.at_most(float(mean[leg]), float(limit[leg]), 1.0, "N", where, _method(leg, method))
-
-
-def _parts(replay: Replay) -> str:
-    cutting = replay.machine.cutting_force
-    return "with friction" + (f" and {cutting:g} N in any direction on the tip on cuts" if cutting else "")
-
-
 def _below(replay: Replay, found: RunningMaximum, limit: Floats, unit: str, method: str) -> Finding:
     """Judge the largest value of each leg against limits (n_legs,), both SI."""
     leg = int(np.argmax(found.values / limit))
     value, bound = float(found.values[leg]), float(limit[leg])
-    return Finding.at_most(value, bound, MM, unit, _place(replay, found, leg), _method(leg, f"{method}; {TOLERATED}"))
+    return Finding.at_most(
+        value, bound, MM, unit, _place(replay, found, leg), nearest_leg(leg, f"{method}; {TOLERATED}")
+    )
 
 
 def _place(replay: Replay, found: RunningMaximum, leg: int) -> Place:
     return replay.place(2 * int(found.at[leg]))
 
 
-def _method(leg: int, method: str) -> str:
+def nearest_leg(leg: int, method: str) -> str:
+    """Return how a claim about all legs was judged, with the leg that is closest to its limit."""
     return f"leg {leg + 1} is closest to its limit; {method}"
 
 
@@ -109,6 +81,4 @@ CLAIMS = (
     Claim("leg rates", rate, needs_pose=False),
     Claim("leg accelerations", acceleration, needs_pose=False),
     Claim("leg jerks", jerk, needs_pose=False),
-    Claim("leg forces", force),
-    Claim("continuous leg forces", continuous_force),
 )

@@ -1,9 +1,9 @@
-"""Claims on the deviation from the toolpath: of the tip, of the axis, of the waypoints from the program, deflection.
+"""Claims on the deviation from the toolpath: of the tip, of the axis, and of the waypoints from the program.
 
-All but the deflection are proven for all times. Between two neighbouring events (a sample, or the time of a waypoint)
-the chord between the samples and the toolpath are both straight, so their distance is at most the larger of the
-distances at both events; and the deviation of the motion from the chord has a proven bound
-(`pentapod.kinematics.proofs.chords`). The sum bounds the deviation at every time in between.
+Proven for all times. Between two neighbouring events (a sample, or the time of a waypoint) the chord between the
+samples and the toolpath are both straight, so their distance is at most the larger of the distances at both events; and
+the deviation of the motion from the chord has a proven bound (`pentapod.kinematics.proofs.chords`). The sum bounds the
+deviation at every time in between.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.geometry.directions import angle_between
 from pentapod.numerics.blocks import in_blocks
-from pentapod.verify.replay.claim import ALLOWANCE, DEG, MM, TOLERATED, Claim, Finding, Idle, with_allowance
+from pentapod.verify.replay.claim import ALLOWANCE, DEG, MM, Claim, Finding, with_allowance
 from pentapod.verify.replay.constant_offset import constant_offset
 from pentapod.verify.replay.replay import Replay
 
@@ -105,32 +105,6 @@ def end(replay: Replay) -> Finding:
     return _within(replay, distance, len(replay.tilt_centres) - 1, method)
 
 
-def deflection(replay: Replay) -> Finding | Idle:
-    """Judge how far the tip moves at the rows because the legs yield: to masses, and on cuts to the cutting force."""
-    machine, bound = replay.machine, replay.specification.deflection
-    if not machine.stiffness.given:
-        return Idle("the machine says nothing of the stiffness of its legs", unknown=bound is not None)
-    if not machine.ends_on_line:
-        return Idle("forces in legs are known only where all end on the tool's line", unknown=bound is not None)
-    found, force = replay.yielding, machine.cutting_force
-    by_masses = np.linalg.norm(found.shift, axis=1)
-    by_cutting = force * found.softest * replay.cuts() if force else np.zeros_like(by_masses)
-    total = by_masses + by_cutting
-    row = int(total.argmax())
-    shift, way, value = found.shift[row], found.ways[row], float(total[row])
-    way = shift + by_cutting[row] * (way if shift @ way >= 0.0 else -way)
-    told = ", ".join(f"{x:+.2f}" for x in way / max(float(np.linalg.norm(way)), float(np.finfo(float).tiny)))
-    method = (
-        f"springs of legs and joints, first order, at the rows: {1e6 * by_masses[row]:.3g} µm by weight and "
-        f"acceleration there, {1e6 * by_cutting[row]:.3g} µm at most by {force:g} N in any direction on cuts; "
-        f"towards about ({told}) in the machine's frame; weight and acceleration alone move it by "
-        f"{1e6 * by_masses.min():.3g} to {1e6 * by_masses.max():.3g} µm"
-    )
-    if bound is None:
-        return Finding(True, MM * value, None, "mm", replay.place(2 * row), f"no bound is asked for; {method}")
-    return Finding.at_most(value, bound, MM, "mm", replay.place(2 * row), f"{method}; {TOLERATED}")
-
-
 def at_samples(chords: Floats) -> Floats:
     """Return for each sample (M,) the larger value of the chords (M − 1,) that meet there."""
     return np.maximum(np.append(chords, chords[-1]), np.append(chords[0], chords))
@@ -154,7 +128,6 @@ CLAIMS = (
     Claim("tip deviation", tip_deviation, needs_proof=True),
     Claim("axis deviation", axis_deviation, needs_proof=True),
     Claim("toolpath covered", coverage, needs_proof=True),
-    Claim("deflection", deflection),
     Claim("starts at the toolpath's start", start),
     Claim("ends at the toolpath's end", end),
 )
