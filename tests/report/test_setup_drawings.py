@@ -107,6 +107,7 @@ def test_numbers_of_touch_off_points_do_not_cover_each_other(standing, turn):
     """From the side, points behind each other have their numbers side by side."""
     run = standing("desk", (0.0, 0.0, 0.0), turn, 0.0)
     points = touch_off_points(run)
+    points = [points[0], points[0], points[1]]
     for drawing in drawings(setup_drawings(run, points))[2:]:
         circles = np.array(re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)" r="(?:7|5\.5)', drawing), dtype=float)
         assert len(circles) == len(points) + 1, "the numbers and the datum"

@@ -150,7 +150,7 @@ def test_the_share_of_a_search_that_is_done_never_falls(tmp_path):
     """The time that is left is told from it; the plans end at the shares that they were given."""
 
     def plan(_, progress) -> str:
-        for stage in ("mesh", "toolpath", "placement", "timing", "verify"):
+        for stage in ("mesh", "toolpath", "a stage of a plugin", "placement", "timing", "verify"):
             for fraction in (0.0, 0.5, 1.0):
                 progress(stage, fraction)
         ends.append(shares[-1][0])

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from parked_jobs import DESK, parked_job
 from pentapod.base.errors import MachineError
@@ -125,6 +126,20 @@ def test_park_poses_that_cannot_be_are_refused(tmp_path, tip, cause):
     assert cause in str(refusal)
     assert "park.tip_mm" in refusal.remedy
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"plan.npz", "verdict.json", "manifest.json"}
+
+
+@pytest.mark.parametrize(("top_mm", "passes"), [(402.0, True), (398.0, False)])
+def test_the_cutter_keeps_clear_of_the_fixture_on_a_way(tmp_path, top_mm, passes):
+    """A ball of 10 mm parked at z 400, over a block or with its lowest 2 mm in it; the shank begins 5 mm higher."""
+    job = parked_job(tmp_path, "\n[park]\ntip_mm = [0, -17, 400]\n")
+    block = trimesh.creation.box((20.0, 20.0, 10.0), trimesh.transformations.translation_matrix((0, -17, top_mm + 5)))
+    block.export(tmp_path / "block.stl")
+    fixture = {"mesh": "block.stl", "unit": "mm", "frame": "machine"}
+    outcome = run(job.with_(fixture=fixture), tmp_path / "out", advice=None)
+    assert outcome.passed == passes, outcome.refusal
+    if not passes:
+        assert outcome.refusal.stage == "way in"
+        assert "the park pose is not within the limits" in str(outcome.refusal)
 
 
 @pytest.mark.parametrize(
