@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from importlib import resources
 from pathlib import Path
@@ -53,12 +54,19 @@ def test_plots_show_every_measure_with_its_extremes(planned, tmp_path, capsys):
     assert said["plots"] == str(page)
     text = page.read_text(encoding="utf-8")
     assert "<link" not in text
+    assert re.search(r"setpoints, .* s; job .*\.toml, machine desk", text)
     rows = page_data(text)["plots"]["rows"]
     assert rows[0]["title"] == "contour error, mm"
     assert [row["title"] for row in rows[-2:]] == ["error of each leg, mm", "force of each drive, N"]
     assert [len(row["series"]) for row in rows] == [1] * (len(rows) - 2) + [5, 5]
     drawn = page_arrays(text)[rows[0]["array"]]
     assert drawn.max() == pytest.approx(said["contour_error_mm"]["largest"], rel=2e-5)
+
+
+def test_a_page_needs_a_name_that_browsers_open(planned, tmp_path, capsys):
+    assert simulate(planned, "--plots", str(tmp_path / "page")) == 2
+    assert "its name must end with .html" in capsys.readouterr().err
+    assert not list(tmp_path.glob("page*"))
 
 
 def test_simulate_within_a_bound_is_a_check(planned, capsys):
@@ -129,7 +137,7 @@ def test_mujoco_as_text_and_json(planned, tmp_path, capsys):
     wrong = ["--engine", "mujoco", "--base-error", "4", "0.9", "0", "0.5", "--offset-error", "1", "0.2"]
     assert simulate(planned, *wrong, "--within", "0.1") == 1
     said = capsys.readouterr()
-    assert said.out.startswith("mujoco: 4001 setpoints, 4 s\n")
+    assert said.out.startswith("mujoco: 4001 setpoints, 4 s; job ")
     assert "leg forces 1 to 5" in said.out
     last = said.err.splitlines()[-1]
     assert last.startswith("the contour error, ")

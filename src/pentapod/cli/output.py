@@ -5,17 +5,30 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from pentapod.base.refusal import Advice
     from pentapod.verify.verdict.verdict import Certificate, NotJudged, Verdict
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+class HtmlFile(click.Path):
+    """A page to write: a name that browsers open."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path of a text."""
+        path = Path(super().convert(value, param, ctx))
+        if path.suffix.lower() not in (".html", ".htm"):
+            self.fail(f"{str(value)!r} is no page: its name must end with .html.", param, ctx)
+        return path
 
 
 def quiet_option(command: Command) -> Command:

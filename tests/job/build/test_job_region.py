@@ -73,6 +73,13 @@ def test_the_share_of_the_region_is_printed(make_job, tmp_path, capsys, more, wo
     assert ("problem" in said) == bool(words)
 
 
+def test_a_part_somewhat_too_wide_is_asked_about(make_job, tmp_path, capsys):
+    job = make_job((UNIT, 'unit = "cm"\nscale = 0.4\nregion_box_mm = [[-30, -30, -99], [30, 30, 99]]'))
+    assert run_cli(["toolpath", str(job), "-o", str(tmp_path / "a.npz")]) == 0
+    said = capsys.readouterr().out
+    assert 'the part is 240 mm wide, the work volume of the machine 150 mm: is unit = "cm" in [part] right?' in said
+
+
 def test_an_open_surface_that_mostly_shows_its_back_is_told_of_flip(make_job):
     mostly = facets()
     mostly[30:] = mostly[30:, ::-1]
@@ -80,7 +87,7 @@ def test_an_open_surface_that_mostly_shows_its_back_is_told_of_flip(make_job):
     assert "flip = true" in str(region_report(job, job_mesh(job)))
 
 
-@pytest.mark.parametrize(("unit", "width"), [("inch", "1,524"), ("m", "60,000")])
+@pytest.mark.parametrize(("unit", "width"), [("cm", "600"), ("inch", "1,524"), ("m", "60,000")])
 def test_a_wrong_unit_is_refused_before_the_toolpath(make_job, unit, width):
     path = make_job((UNIT, f'unit = "{unit}"'))
     message = rf'job\.toml:3: part.unit: the part is {width} mm wide, the work volume 150 mm .*unit = "mm"\?'
@@ -90,9 +97,9 @@ def test_a_wrong_unit_is_refused_before_the_toolpath(make_job, unit, width):
 
 
 def test_what_could_be_planned_is_not_refused_for_its_size(make_job):
-    """A small region of a large part, more set-ups, lines that may lie anywhere, and a part of half a metre."""
+    """A small region of a large part, more set-ups, lines that may lie anywhere."""
     inch = (UNIT, 'unit = "inch"')
-    checked(make_job((UNIT, 'unit = "cm"')))
+    checked(make_job((UNIT, 'unit = "cm"\nregion_box_mm = [[-300, -300, -999], [300, 300, 999]]')))
     checked(make_job((UNIT, 'unit = "inch"\nregion_box_mm = [[-100, -100, -999], [100, 100, 999]]')))
     free = ('mode = "fixed"\nposition_mm', "# position_mm"), ("rotation_deg = [180, 0, 0]", "setups = 4")
     checked(make_job(inch, *free))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from pentapod.cli.numbers import Real, Whole
-from pentapod.cli.output import echo_json, json_option, quiet_option
+from pentapod.cli.output import HtmlFile, echo_json, json_option, quiet_option
 from pentapod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def plan_poses(
 @click.option("-m", "--machine", "machine_name", help="The machine's file  [default: the shipped one of that name]")
 @click.option("-o", "--out", type=click.Path(path_type=Path),
               help="The calibration file  [default: calibration.toml beside MEASUREMENTS]")  # fmt: skip
-@click.option("--report", type=click.Path(path_type=Path),
+@click.option("--report", type=HtmlFile(),
               help="The page with the residuals  [default: calibration.html beside the calibration file]")  # fmt: skip
 @click.option("--find", multiple=True, type=click.Choice(GROUPS),
               help="Find only these numbers; may be repeated  [default: all, of few docks the zeros]")  # fmt: skip

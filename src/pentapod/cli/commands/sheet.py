@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import click
 
-from pentapod.cli.output import echo_json, json_option, quiet_option
+from pentapod.cli.output import HtmlFile, echo_json, json_option, quiet_option
 from pentapod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
 @click.option("--job", type=click.Path(path_type=Path), help="The job file of the run, if it was moved.")
-@click.option("-o", "--out", type=click.Path(path_type=Path), help="The file to write.  [default: DIR/sheet.html]")
+@click.option("-o", "--out", type=HtmlFile(), help="The file to write.  [default: DIR/sheet.html]")
 @json_option
 @quiet_option
 def sheet(folder: Path, job: Path | None, out: Path | None, as_json: bool, quiet: bool) -> int:

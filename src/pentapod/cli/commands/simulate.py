@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pentapod.cli.numbers import Real, Whole
-from pentapod.cli.output import echo_json, json_option, quiet_option
+from pentapod.cli.output import HtmlFile, echo_json, json_option, quiet_option
 from pentapod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ _LEG, _MM = Whole(1), Real()
               help="MuJoCo: error of a platform joint along the tool; may be repeated.")  # fmt: skip
 @click.option("--within", "within_mm", type=Real(0.0, min_open=True), metavar="MM",
               help="Fail if the contour error is larger.")  # fmt: skip
-@click.option("--plots", "plots", type=click.Path(path_type=Path), metavar="FILE",
+@click.option("--plots", "plots", type=HtmlFile(), metavar="FILE.html",
               help="Write an HTML page with all measures against time.")  # fmt: skip
 @json_option
 @quiet_option
@@ -76,11 +76,12 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
         click.echo(f"refused: {found}", err=True)
         return 1
     lines, content, tracking = found
+    whole = f"{len(read.legs)} setpoints, {read.duration:.6g} s; job {job}, machine {reference.machine.name}"
     if plots is not None:
         from pentapod.report import write_simulation
 
         names = ("as programmed", f"with {given['cutting_force_n']} N on cuts")
-        write_simulation(plots, program.name, engine, lines, list(zip(names, tracking, strict=False)))
+        write_simulation(plots, program.name, engine, [whole, *lines], list(zip(names, tracking, strict=False)))
         lines, content = [*lines, f"  plots: {plots}"], {**content, "plots": str(plots)}
     largest = max(part.measures[0].largest for part in tracking)
     passed = within_mm is None or largest <= within_mm
@@ -89,7 +90,7 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
             {"engine": engine, "rows": len(read.legs), "same_job": same_job, "done": True, "passed": passed, **content}
         )
     elif not quiet:
-        click.echo("\n".join([f"{engine}: {len(read.legs)} setpoints, {read.duration:.6g} s", *lines]))
+        click.echo("\n".join([f"{engine}: {whole}", *lines]))
     if not same_job and not quiet:
         click.echo("note: the program was made from another job; its toolpath may differ", err=True)
     if not passed:

@@ -39,13 +39,14 @@ def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet
         progress("mesh", 0.0)
         mesh = job_mesh(loaded, progress)
         progress("mesh", 1.0)
+        machine = job_machine(loaded)
         try:
-            check_reach(loaded, job_machine(loaded), mesh)
+            check_reach(loaded, machine, mesh)
         except JobError as error:  # a part that is too large may be for another machine; a wrong unit takes a long time
             if error.key == "part.unit":
                 raise
         progress("toolpath", 0.0)
-        path, report = job_toolpath(loaded, mesh, progress)
+        path, report = job_toolpath(loaded, mesh, progress, machine=machine)
         progress("toolpath", 1.0)
         progress("writing", 0.0, out.name)
         write_toolpath(path, out, format_name)

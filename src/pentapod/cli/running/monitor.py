@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from pentapod.cli.numbers import Real
-from pentapod.cli.output import echo_json, json_option, quiet_option
+from pentapod.cli.output import HtmlFile, echo_json, json_option, quiet_option
 from pentapod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
               help="Fail if the contour error is larger.  [default: the job's tolerance.path_mm]")  # fmt: skip
 @click.option("--axis-tolerance-deg", "axis_deg", type=Real(0.0, min_open=True), metavar="DEG",
               help="Fail if the axis error is larger.")  # fmt: skip
-@click.option("-o", "--out", type=click.Path(path_type=Path), metavar="FILE.html",
+@click.option("-o", "--out", type=HtmlFile(), metavar="FILE.html",
               help="Write an HTML page with all measures against time.")  # fmt: skip
 @json_option
 @quiet_option

@@ -17,6 +17,9 @@ from pentapod.mesh.io.registry import states_unit
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
 
+DOUBTFUL = 2.5
+"""Width of a part, in widths of the work volume, from which its unit is doubted where another one makes it fit."""
+
 
 def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
     """Raise JobError for a region that no plan can cover: in more places than there are set-ups, too far apart.
@@ -25,11 +28,15 @@ def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
     points, each farther than that from the others, than set-ups; twice the distance of tips from their contacts and a
     stepover at each end are allowed for. Lines that cover no region may lie anywhere on the part, and pass. An empty
     region of a part whose unit is doubtful raises, too: the region's box may be in the right unit.
+
+    That bound is wide. A part that is to be machined whole, in one set-up, is refused from DOUBTFUL times the width of
+    the work volume on where another unit of its numbers makes it fit.
     """
     if not covers_region(job):
         return
     apart = farthest_apart(job, machine)
     if np.linalg.norm(np.ptp(mesh.bounds, axis=0)) <= apart:
+        _check_unit(job, machine, mesh)
         return
     region = Patch.of(mesh, job_region(job))
     points = region.vertices[np.unique(region.faces)]
@@ -50,6 +57,23 @@ def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
         "part", key, f"the part is {size} wide, the work volume {width}",
         expected=f"places to machine that are at most {from_si(apart, 'mm'):,.0f} mm from each other", remedy=remedy,
     )  # fmt: skip
+
+
+def _check_unit(job: Job, machine: Machine, mesh: Mesh) -> None:
+    """Raise JobError for a part that is machined whole, too wide by far, and fits with another unit of its numbers."""
+    asked, extent, width = job.part, float(np.ptp(mesh.bounds, axis=0).max()), machine.work.diameter
+    whole = asked.region_box_mm is None and job.placement.setups == 1
+    if states_unit(job.mesh_path) or not whole or extent <= DOUBTFUL * width:
+        return
+    fits = [name for name, metres in UNITS.items() if extent * metres / UNITS[asked.unit] <= width]
+    if fits:
+        size, volume = (f"{from_si(value, 'mm'):,.0f} mm" for value in (extent, width))
+        raise job.error(
+            "part", "unit", f"the part is {size} wide, the work volume {volume}",
+            expected=f"the unit of the numbers in {job.mesh_path.name}",
+            remedy=f'unit = "{max(fits, key=UNITS.__getitem__)}"? If "{asked.unit}" is right, say with region_box_mm '
+            "what is machined, or allow several placement.setups",
+        )  # fmt: skip
 
 
 def farthest_apart(job: Job, machine: Machine) -> float:

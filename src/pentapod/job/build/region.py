@@ -16,11 +16,16 @@ from pentapod.cutters.mounted import BallEnded
 from pentapod.cutters.registry import CUTTERS
 from pentapod.geometry.directions import normalised
 from pentapod.job.schema.job import Job
+from pentapod.machine.machine import Machine
+from pentapod.mesh.io.registry import states_unit
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.region import ON_PART, Region
 from pentapod.mesh.region_share import RegionShare, why_empty
 from pentapod.toolpath.options import CoverOptions
 from pentapod.toolpath.strategies.registry import STRATEGIES
+
+WIDE = 1.5
+"""Width of a part, as a multiple of the work volume's, beyond which its unit is asked about."""
 
 LEAST_SHARE = 0.5
 """Share of the surface that the direction sees, below which the region is called small."""
@@ -69,12 +74,20 @@ def covers_region(job: Job) -> bool:
     return strategy in STRATEGIES and issubclass(STRATEGIES[strategy].options, CoverOptions)
 
 
-def region_report(job: Job, mesh: Mesh) -> RegionReport:
+def region_report(job: Job, mesh: Mesh, machine: Machine | None = None) -> RegionReport:
     """Return how much of the part's surface a job's region holds, and the problems that this suggests.
 
+    machine: whose work volume the part is compared with, where its file states no unit; None for no comparison.
     Raises ToolpathError where the region holds nothing: a ball would roll over the back of a sheet, too.
     """
     region, problems = job_region(job), list[str]()
+    widest = float(np.ptp(mesh.bounds, axis=0).max())
+    if machine is not None and widest > WIDE * machine.work.diameter and not states_unit(job.mesh_path):
+        size, width = (f"{from_si(value, 'mm'):.4g} mm" for value in (widest, machine.work.diameter))
+        problems.append(
+            f'the part is {size} wide, the work volume of the machine {width}: is unit = "{job.part.unit}" in [part] '
+            "right?"
+        )
     found = RegionShare.of(mesh, region)
     if found.inside <= 0.0:
         raise ToolpathError("the region holds nothing to machine", key="region", remedy=why_empty(mesh, region))

@@ -159,7 +159,7 @@ def job_toolpath(
     else:
         asked = job_options(job)
         if covers_region(job):
-            region.append(region_report(job, mesh))
+            region.append(region_report(job, mesh, machine))
         try:
             toolpath, report = _along_the_part(
                 mesh, tool, asked, kept_axis(job), within(progress, "toolpath", 0.0, CHECKED)
