@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pentapod.base.values import Value
+from pentapod.geometry.polyline import arc_length
+from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 
 @dataclass(frozen=True)
@@ -39,9 +41,9 @@ class PathReport(Value):
     def __str__(self) -> str:
         stepover = f", up to {1e3 * self.stepover:.4g} mm apart" if self.stepover else ""
         text = (
-            f"{self.strategy}: {self.passes:,} passes{stepover}, {self.cut_length:.4g} m of cut, "
-            f"{self.waypoints:,} waypoints; {self.stay_downs:,} links on the surface, {self.hops:,} hops, "
-            f"{self.retracts:,} rapids at the clearance height"
+            f"{self.strategy}: {self.passes:,} passes{stepover}, {self.cut_length:.4g} m along the surface; "
+            f"{self.stay_downs:,} links on the surface, {self.hops:,} hops, {self.retracts:,} rapids at the clearance "
+            "height"
         )
         for note in self.notes:
             text += f"\n  note: {note}"
@@ -52,3 +54,14 @@ class PathReport(Value):
         if self.tight:
             text += f"\n  problem: at {self.tight:,} waypoints the concave radius is below the ball's or the stand-off"
         return text
+
+
+def totals(toolpath: Toolpath) -> str:
+    """Return how many waypoints a toolpath has, and how far its tip moves on cuts, links and rapids."""
+    parts = {kind: [s for s in toolpath.segments if s.kind is kind] for kind in SegmentKind}
+    texts = [
+        f"{len(own):,} {kind}{'s' if len(own) > 1 else ''} of {sum(float(arc_length(s.tips)[-1]) for s in own):.4g} m"
+        for kind, own in parts.items()
+        if own
+    ]
+    return f"toolpath: {len(toolpath):,} waypoints; the tip moves along {', '.join(texts)}"

@@ -59,5 +59,5 @@ def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet
     elif not quiet:
         click.echo(str(mesh.diagnosis))
         click.echo(str(report))
-        click.echo(f"toolpath: {out}")
+        click.echo(f"wrote {out}")
     return 0

@@ -43,7 +43,7 @@ from pentapod.toolpath.gouge.report import GougeOptions, Remedy
 from pentapod.toolpath.lines.scallop import stepover_for
 from pentapod.toolpath.linking.links import LinkStyle
 from pentapod.toolpath.options import PathOptions
-from pentapod.toolpath.path_report import PathReport
+from pentapod.toolpath.path_report import PathReport, totals
 from pentapod.toolpath.strategies.registry import STRATEGIES
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
@@ -181,7 +181,7 @@ def job_toolpath(
         reports += _turns(toolpath, from_si(job.axis.si.rate, "deg_mm"))
     if job.feed.dwell_s is not None:
         toolpath = toolpath.stopping(job.feed.dwell_s)
-    return with_process(job, toolpath), Reports(tuple(reports))
+    return with_process(job, toolpath), Reports((*reports, totals(toolpath)))
 
 
 def _along_the_part(
