@@ -25,10 +25,9 @@ class HtmlFile(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path of a text."""
-        path = Path(super().convert(value, param, ctx))
-        if path.suffix.lower() not in (".html", ".htm"):
+        if Path(str(value)).suffix.lower() not in (".html", ".htm"):
             self.fail(f"{str(value)!r} is no page: its name must end with .html.", param, ctx)
-        return path
+        return super().convert(value, param, ctx)
 
 
 def quiet_option(command: Command) -> Command:

@@ -42,26 +42,38 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
             yield raising_again(show)
 
 
+class TimeLeft:
+    """The time that a stage takes yet, as text, from its share; an estimate that grows was wrong and is not told."""
+
+    def __init__(self, began: float) -> None:
+        self.began, self.least = began, float("inf")
+
+    def text(self, now: float, fraction: float) -> str:
+        """Return "about 5 s left"; empty where it is not known."""
+        seconds = now - self.began
+        known = fraction >= FIRST_SHARE and seconds > 0.0
+        left = seconds * (1.0 - fraction) / fraction if known else float("inf")
+        told = left < GROWN * self.least
+        self.least = min(left, self.least)
+        return f"about {left:.0f} s left" if told else ""
+
+
 class Lines:
     """A Progress that prints a line every few seconds: stage, share, time left, note."""
 
     def __init__(self, echo: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
         self.echo, self.clock = echo, clock
-        self.stage, self.began, self.told, self.left = "", clock(), clock(), float("inf")
+        self.stage, self.told, self.left = "", clock(), TimeLeft(clock())
 
     def __call__(self, stage: str, fraction: float, note: str = "") -> None:
         """Print a line if it is time."""
         now = self.clock()
         if stage != self.stage:
-            self.stage, self.began, self.left = stage, now, float("inf")
+            self.stage, self.left = stage, TimeLeft(now)
         if now - self.told < LINE_EVERY_S:
             return
-        self.told, seconds = now, now - self.began
-        share = f" {100.0 * fraction:.0f} %" if fraction > 0.0 else ""
-        left = seconds * (1.0 - fraction) / fraction if fraction >= FIRST_SHARE else float("inf")
-        # An estimate that grows was wrong: then only what has passed is told.
-        more = f"about {left:.0f} s left" if left < GROWN * self.left and seconds > 0.0 else f"{seconds:.0f} s so far"
-        self.left = min(left, self.left)
+        self.told, share = now, f" {100.0 * fraction:.0f} %" if fraction > 0.0 else ""
+        more = self.left.text(now, fraction) or f"{now - self.left.began:.0f} s so far"
         self.echo(f"{stage}{share}, {more}{f': {note}' if note else ''}")
 
 
@@ -70,31 +82,31 @@ def _bars() -> Generator[Progress]:
     """Yield a Progress that draws a bar for each stage; the clock of a stage stands still once the next one begins."""
     from rich.console import Console
     from rich.logging import RichHandler
-    from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bars
 
-    tasks: dict[str, TaskID] = {}
+    tasks: dict[str, tuple[TaskID, TimeLeft]] = {}
     columns = (
         TextColumn("{task.description:<10}"),
         BarColumn(),
         TextColumn("{task.fields[share]:>5}"),
-        TextColumn("{task.fields[rate]:>9}"),
         TimeElapsedColumn(),
-        TimeRemainingColumn(compact=True),
+        TextColumn("{task.fields[left]:>16}"),
         TextColumn("{task.fields[note]}"),
     )
     with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
 
         def show(stage: str, fraction: float, note: str = "") -> None:
+            now = time.monotonic()
             if stage not in tasks:
-                for other in tasks.values():
+                for other, _ in tasks.values():
                     bars.stop_task(other)
                 # Without a total the bar pulses.
-                tasks[stage] = bars.add_task(stage, total=None, note=note, rate="", share="")
-            speed = bars.tasks[tasks[stage]].speed
-            rate = f"{100.0 * speed:.3g} %/s" if speed and fraction < 1.0 else ""
+                tasks[stage] = bars.add_task(stage, total=None, note=note, left="", share=""), TimeLeft(now)
+            task, left = tasks[stage]
             total, share = (1.0, f"{100.0 * fraction:.0f} %") if fraction > 0.0 else (None, "")
-            bars.update(tasks[stage], total=total, completed=fraction, note=note, rate=rate, share=share)
+            told = left.text(now, fraction) if fraction < 1.0 else ""
+            bars.update(task, total=total, completed=fraction, note=note, left=told, share=share)
 
         log = logging.getLogger("pentapod")
         level = log.level

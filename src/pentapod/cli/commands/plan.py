@@ -111,7 +111,7 @@ def _each(jobs: tuple[Path, ...], asked: Asked) -> tuple[int, Any]:
 def _planned(path: Path, asked: Asked) -> tuple[int, dict[str, Any] | None]:
     """Plan one job and print what became of it; return the exit code, and what JSON says."""
     from pentapod.base.errors import InputError
-    from pentapod.cli.changes import changed, withdraw, written_before
+    from pentapod.cli.changes import CHANGED_JOB, changed, withdraw, written_before
     from pentapod.job.schema.job import Job
 
     before = written_before(asked.out)
@@ -138,6 +138,8 @@ def _planned(path: Path, asked: Asked) -> tuple[int, dict[str, Any] | None]:
             raise
         click.echo(f"error: {error}", err=True)  # at once: the search takes as long as a plan or two
         return _advised(job, options, as_json=asked.as_json, quiet=asked.quiet)
+    if not asked.changes:
+        (asked.out / CHANGED_JOB).unlink(missing_ok=True)  # of the run before
     return shown(outcome, asked.out, explain=asked.explain, as_json=asked.as_json, quiet=asked.quiet)
 
 

@@ -16,6 +16,7 @@ from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.parts import Regions, Smaller
 from pentapod.job.advice.places import Place
 from pentapod.job.advice.settings import Setting, Settings, joined, merged
+from pentapod.job.build.values import job_machine
 from pentapod.planning.estimate import Estimate
 
 FEWEST = 4
@@ -224,8 +225,10 @@ class Trials:
         if settings.share_in_reach(settings.sketch) < 1.0:
             return
         settings.tell("another tool.length_mm")
-        for share in self.options.lengths:
-            length = round(float(from_si(share * settings.machine.tool_length, "mm")))
+        lengths = [from_si(share * settings.machine.tool_length, "mm") for share in self.options.lengths]
+        if settings.job.tool.length_mm is not None:  # first the length that the machine's file has
+            lengths.insert(0, from_si(job_machine(settings.job.with_(tool={"length_mm": None})).tool_length, "mm"))
+        for length in (round(float(each)) for each in lengths):
             try:
                 other = replace(settings, machine=settings.machine.with_tool(to_si(length, "mm")))
                 found = other.less(base, settings.sketch)

@@ -85,6 +85,8 @@ def stand_facts(run: PlannedRun) -> list[Fact]:
     facts.append(
         ("turn", f"{stand.turned.upper()} points to {words_of(np.degrees(stand.turn), 2)}° (0° is x, 90° is y)")
     )
+    upwards = int(np.argmax(np.abs(stand.up)))
+    facts.append(("up", f"{'−' if stand.up[upwards] < 0.0 else '+'}{'XYZ'[upwards]} of the mesh"))
     if run.table is not None:
         facts.append(("table", f"surface at z {words_of(1e3 * run.table)}; the part stands flat on it"))
     else:
