@@ -13,6 +13,7 @@ from pentapod.job.build.limits import placement_limits
 from pentapod.job.build.placed_check import Ranges, meetings, refusal_of
 from pentapod.job.build.placement import job_weights
 from pentapod.job.build.toolpath import drops_gouges
+from pentapod.job.build.values import job_compensation
 from pentapod.job.plan_before import PlanBefore
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import INTERRUPTED, StageRunner
@@ -207,7 +208,8 @@ class Task:
         machine = self.machine
         source = Provenance(
             machine.name, machine.digest, self.job.digest, __version__, self.piece, *made_on,
-            calibration=machine.calibration_name, left_out=self.left_out, upright=self.job.asked is not None,
+            calibration=machine.calibration_name, compensation=job_compensation(self.job, machine),
+            left_out=self.left_out, upright=self.job.asked is not None,
         )  # fmt: skip
         program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
         program = with_process(program, trajectory, self.toolpath)

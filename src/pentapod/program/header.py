@@ -38,8 +38,10 @@ SETUP_KEYS = (WAYPOINTS, BOX)
 """Keys of programs of several set-ups."""
 CALIBRATION = "calibration"
 """Key of programs for a machine as it was measured."""
+COMPENSATION = "compensation"
+"""Key of programs with which drives are told more than the lengths of the legs, because legs yield to their loads."""
 COMMANDS = "commands"
-"""Key of files in which the rows are what drives are told, by a machine's leg model."""
+"""Key of files in which the rows are what drives are told, by a machine's leg model, and what its legs yield."""
 LEFT_OUT = "left_out"
 """Key of programs that leave cuts of the toolpath out: pairs of waypoints."""
 UPRIGHT = "upright"
@@ -52,7 +54,19 @@ LEGS = "legs"
 """Key of programs for machines that have not as many legs as a linear pentapod."""
 MADE_ON = ("processor", "libraries")
 """Keys of planned programs: on another kind of processor or with other libraries bits may differ."""
-OPTIONAL_KEYS = (LEGS, CALIBRATION, COMMANDS, GUIDES, *SETUP_KEYS, LEFT_OUT, UPRIGHT, SWITCHES, LASER_POWER, *MADE_ON)
+OPTIONAL_KEYS = (
+    LEGS,
+    CALIBRATION,
+    COMPENSATION,
+    COMMANDS,
+    GUIDES,
+    *SETUP_KEYS,
+    LEFT_OUT,
+    UPRIGHT,
+    SWITCHES,
+    LASER_POWER,
+    *MADE_ON,
+)
 UNVERIFIED = "UNVERIFIED: no verdict has passed this program"
 """First line, after the comment mark, of files written for a controller without a passed verdict."""
 
@@ -97,6 +111,8 @@ def header_text(program: Program) -> str:
         values[LEGS] = str(program.legs.shape[1])
     if source.calibration:
         values[CALIBRATION] = string_text(source.calibration)
+    if source.compensation:
+        values[COMPENSATION] = string_text(source.compensation)
     if source.commands:
         values[COMMANDS] = string_text(source.commands)
     if program.rail_positions is not None:

@@ -21,6 +21,7 @@ from pentapod.program.header import (
     BOX,
     CALIBRATION,
     COMMANDS,
+    COMPENSATION,
     GUIDES,
     KEYS,
     LASER_POWER,
@@ -37,7 +38,7 @@ from pentapod.program.header import (
     Header,
 )
 from pentapod.program.header_values import bound_of, list_of, number_of, switches_of
-from pentapod.program.program import FORMAT_VERSION, Provenance, Switch
+from pentapod.program.program import COMPENSATIONS, FORMAT_VERSION, Provenance, Switch
 from pentapod.toolpath.linking.partition import Piece
 
 LARGEST_COUNT = 2**63 - 1
@@ -112,6 +113,7 @@ class _Reader:
                 left_out=self._left_out(),
                 upright=self._true(UPRIGHT),
                 unverified=self.unverified,
+                compensation=self._one_of(COMPENSATION, COMPENSATIONS) if COMPENSATION in self.values else "",
                 **{key: self._text(key) for key in (*MADE_ON, CALIBRATION, COMMANDS) if key in self.values},
             ),
             rows=self._rows(),

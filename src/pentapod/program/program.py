@@ -20,6 +20,9 @@ from pentapod.program.resolution import to_millimetres
 from pentapod.toolpath.linking.partition import Piece
 
 FORMAT_VERSION = 1
+GRAVITY = "gravity"
+COMPENSATIONS = (GRAVITY,)
+"""Loads to which legs yield and which the drives can make good."""
 
 
 @dataclass(frozen=True)
@@ -28,10 +31,10 @@ class Provenance(Value):
 
     piece: of the toolpath, where the program is one of several set-ups. processor, libraries: with which it was made;
     with the same ones it is the same to the bit. unverified: it was written for a controller without a passed verdict.
-    calibration: name of the machine's calibration, "" where there is none. commands: digest of the leg model by which
-    the rows are commands of drives; "" where they are readings of the legs. left_out: pairs of waypoints of the job's
-    toolpath between which it makes no cut. upright: whether the tool stands along the view, though the job lets it
-    lean.
+    calibration: name of the machine's calibration, "" where there is none. compensation: "gravity" where drives are to
+    be told what the legs yield to it, else "". commands: digest of all by which the rows are commands of drives; ""
+    where they are readings of the legs. left_out: pairs of waypoints of the job's toolpath between which it makes no
+    cut. upright: whether the tool stands along the view, though the job lets it lean.
 
     >>> source = Provenance(machine.name, machine.digest, "", "0.1.0")
     """
@@ -45,6 +48,7 @@ class Provenance(Value):
     libraries: str = ""
     unverified: bool = False
     calibration: str = ""
+    compensation: str = ""
     commands: str = ""
     left_out: tuple[tuple[int, int], ...] = ()
     upright: bool = False

@@ -16,6 +16,8 @@ from pentapod.machine.machine import Machine
 from pentapod.machine.parts import ControllerSettings, ToolLimits
 from pentapod.mesh.io.load import load_mesh
 from pentapod.mesh.mesh import Mesh
+from pentapod.program.commands import can_compensate
+from pentapod.program.program import GRAVITY
 from pentapod.toolpath.axis.orientation import Orientation
 from pentapod.toolpath.gouge.report import GougeOptions
 from pentapod.toolpath.strategies.registry import STRATEGIES
@@ -52,12 +54,22 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
         remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
         what = "how far the tip deflects is not known on this machine"
         raise job.error("tolerance", "deflection_mm", what, value=deflection, remedy=remedy)
+    if job.output.compensation == GRAVITY and not can_compensate(machine):
+        remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
+        what = "how far the legs of this machine yield is not known"
+        raise job.error("output", "compensation", what, remedy=remedy)
     try:
         return dataclasses.replace(
             machine, controller=controller, tool_length=length, tool_limits=limits, cutting_force=cutting
         )
     except MachineError as error:
         raise job.error("tool", "length_mm", error.what) from error
+
+
+def job_compensation(job: Job, machine: Machine) -> str:
+    """Return what of the legs' yielding drives make good, as programs name it; machine: that of the job."""
+    asked = job.output.compensation
+    return (GRAVITY if can_compensate(machine) else "") if asked is None else asked.removeprefix("none")
 
 
 def job_mesh(job: Job, progress: Progress = silent) -> Mesh:

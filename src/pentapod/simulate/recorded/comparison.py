@@ -11,6 +11,7 @@ from pentapod.base.arrays import Bools, Floats
 from pentapod.base.errors import InputError
 from pentapod.geometry.directions import angle_between
 from pentapod.machine.dynamics.dynamics import Dynamics
+from pentapod.program.commands import commands_digest, readings
 from pentapod.program.posts.motion import lengths_at
 from pentapod.simulate.measures import Measure, contour_errors, on_cuts
 from pentapod.simulate.recorded.alignment import Alignment, align
@@ -110,12 +111,11 @@ def compare(
 
 def _readings(log: RunLog, reference: Reference) -> RunLog:
     """Return a log with what the legs read, of one with what their drives count."""
-    machine, component = reference.machine, np.array(reference.program.component)
-    if not machine.leg_model.is_needed:
+    if not commands_digest(reference.program, reference.machine):
         return log
 
     def read(values: Floats) -> Floats:
-        found = machine.readings(values, component)
+        found = readings(reference.program, reference.machine, values)
         return np.where(np.isfinite(found), found, values)  # far from the program, where no pose is
 
     return replace(log, legs=read(log.legs), commands=None if log.commands is None else read(log.commands))
