@@ -16,8 +16,10 @@ from pentapod.job.verdict import judge
 from pentapod.kinematics import Component
 from pentapod.machine import Dynamics, LegModel, Machine, Stiffness
 from pentapod.program import Program, Provenance, read_csv, write_csv
-from pentapod.program.commands import commanded, read_back
+from pentapod.program.commands import SMOOTH_S, commanded, read_back
+from pentapod.program.joined import joined
 from pentapod.program.posts import PostInput, find_post, read_post, write_post
+from pentapod.program.program import ProcessForce
 from usual_job import job_text
 
 LIBRARY = Path(__file__).parents[2] / "src" / "pentapod" / "machine" / "library"
@@ -40,7 +42,7 @@ MACHINES = {
 }
 
 
-def program_of(machine, compensation="gravity"):
+def program_of(machine, compensation="gravity", force=None):
     """A motion of 20 mm that leans the tool."""
     share = np.linspace(0.0, 1.0, 60)[:, None]
     tips = machine.work.centre + 0.02 * np.hstack([share, -share, 0.5 * share])
@@ -48,7 +50,7 @@ def program_of(machine, compensation="gravity"):
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     legs = np.round(machine.robot.leg_lengths(tips + machine.tool_length * axes, -axes), 11)
     source = Provenance(machine.name, machine.digest, "", "1", compensation=compensation)
-    return Program(1e-3, legs, "cubic", Component(1, 1), RigidTransform.identity(), source)
+    return Program(1e-3, legs, "cubic", Component(1, 1), RigidTransform.identity(), source, process_force=force)
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -69,10 +71,11 @@ def test_a_leg_is_longer_by_its_load_over_its_stiffness(name):
 
 
 @pytest.mark.parametrize("post", POSTS)
+@pytest.mark.parametrize("force", [None, ProcessForce(40.0, ((5, 20), (30, 59)))], ids=["gravity", "process"])
 @pytest.mark.parametrize("name", MACHINES)
-def test_posted_commands_come_back_to_the_last_digit(name, post, tmp_path):
+def test_posted_commands_come_back_to_the_last_digit(name, post, force, tmp_path):
     machine = MACHINES[name]
-    program = program_of(machine)
+    program = program_of(machine, force=force)
     write_post(PostInput(program, machine), post, tmp_path, unverified=True)
     raw, back = read_post(tmp_path, post), read_post(tmp_path, post, machine)
     if find_post(post).readings:
@@ -82,6 +85,32 @@ def test_posted_commands_come_back_to_the_last_digit(name, post, tmp_path):
     assert raw.provenance.commands
     assert np.abs(back.legs - program.legs).max() <= 2.0 * QUANTUM
     assert back.provenance == replace(program.provenance, unverified=True)
+
+
+def test_a_process_force_pushes_back_against_the_motion():
+    """In the middle of a long cut at constant speed the loads of the legs do the work of the force, and no other."""
+    machine = MACHINES["springs"]
+    count = 600
+    tips = machine.work.centre + np.linspace(0.0, 0.03, count)[:, None] * [0.6, -0.8, 0.0]
+    down = np.tile([0.0, 0.0, -1.0], (count, 1))
+    legs = np.round(machine.robot.leg_lengths(tips + machine.tool_length * down, -down), 11)
+    source = Provenance(machine.name, machine.digest, "", "1", compensation="gravity")
+    plain = Program(1e-3, legs, "cubic", Component(1, 1), RigidTransform.identity(), source)
+    cutting = replace(plain, process_force=ProcessForce(50.0, ((100, 499),)))
+    more = commanded(cutting, machine).legs - commanded(plain, machine).legs
+    rate = np.gradient(legs, 1e-3, axis=0)
+    middle = slice(200, 400)
+    springs = 1.0 / (1.0 / machine.stiffness.leg_stiffness + 1.0 / machine.stiffness.joint_stiffness)
+    work = (more * springs * rate)[middle].sum(axis=1)  # the legs push the tool against the force of the process
+    speed = 0.03 / (count - 1) / 1e-3
+    np.testing.assert_allclose(work, 50.0 * speed, rtol=2e-3)
+    edge = round(0.5 * SMOOTH_S / 1e-3) + 1
+    assert not more[: 100 - edge].any()
+    assert not more[500 + edge :].any()
+    # It comes and goes without a corner: its acceleration is far below what legs may have.
+    assert np.abs(np.diff(more, 2, axis=0)).max() / 1e-6 < 0.02 * machine.legs.max_acceleration.min()
+    both = joined(plain, replace(cutting, legs=legs + (legs[-1] - legs[0])))
+    assert both.process_force.cuts == ((100 + len(both.legs) - count, 499 + len(both.legs) - count),)
 
 
 def test_another_stiffness_or_weight_cannot_undo_commands():
@@ -158,5 +187,7 @@ def test_compensation_is_asked_for_in_the_job(make_job):
     desk = Job.load(make_job())
     other = desk.with_(**{"output.compensation": "none"})
     assert other.digest != desk.digest
+    with pytest.raises(JobError, match=r"output\.compensation: there is no process force"):
+        job_machine(desk.with_(**{"output.compensation": "process"}))
     with pytest.raises(JobError, match=r"output\.compensation: how far the legs of this machine yield is not known"):
         job_machine(desk.with_(**{"output.compensation": "gravity"}))

@@ -13,7 +13,7 @@ from pentapod.job.build.limits import placement_limits
 from pentapod.job.build.placed_check import Ranges, meetings, refusal_of
 from pentapod.job.build.placement import job_weights
 from pentapod.job.build.toolpath import drops_gouges
-from pentapod.job.build.values import job_compensation
+from pentapod.job.build.values import PROCESS, job_compensation
 from pentapod.job.plan_before import PlanBefore
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import INTERRUPTED, StageRunner
@@ -26,7 +26,7 @@ from pentapod.planning.placement.common_axes import FIXED
 from pentapod.planning.plan import PlacementOptions, fits
 from pentapod.planning.problem.constraints import FREE
 from pentapod.program import Program, Provenance, sample, write_csv
-from pentapod.program.process import with_process
+from pentapod.program.process import with_process, with_process_force
 from pentapod.timing import Explanation, JerkOptions, Limit, Trajectory, certify, explain, retime, slow_cuts
 from pentapod.timing.jerk.options import DEFAULTS
 from pentapod.timing.reuse import retime_as_before
@@ -213,5 +213,7 @@ class Task:
         )  # fmt: skip
         program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
         program = with_process(program, trajectory, self.toolpath)
+        if self.job.output.compensation == PROCESS:
+            program = with_process_force(program, trajectory, self.toolpath, machine.cutting_force)
         write_csv(program, file)
         return program

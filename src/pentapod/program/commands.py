@@ -1,8 +1,9 @@
 """Commands: what drives are told so that the legs, under their loads, have the lengths of a program.
 
 A leg that pushes with the force F gets shorter by F/k. Told l + F/k, it has the length l. The force is that of the
-weights in the pose of the lengths l; it is known before the leg yields. What a screw or a table of pitch errors adds
-comes after it: `LegModel`. Commands are made where programs are posted, and nowhere before.
+weights in the pose of the lengths l, and of a process force against the motion; it is known before the leg yields. What
+a screw or a table of pitch errors adds comes after it: `LegModel`. Commands are made where programs are posted, and
+nowhere before.
 """
 
 from __future__ import annotations
@@ -11,14 +12,16 @@ import dataclasses
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError, MachineError
+from pentapod.kinematics.forces import leg_force_map
 from pentapod.machine.calibration.digest import digest_of
 from pentapod.machine.dynamics.deflection import leg_pushes
 from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
-from pentapod.program.header import COMPENSATION
+from pentapod.program.header import COMPENSATION, CUT_ROWS, PROCESS_FORCE
 from pentapod.program.program import GRAVITY, Program
 from pentapod.program.resolution import quantised
 
@@ -28,6 +31,12 @@ more where it is shorter, below one in a thousand."""
 
 SETTLED_M = 1e-14
 """Change of a length that ends the fixed point, metres."""
+
+SMOOTH_S = 0.1
+"""Seconds in which a process force grows from nothing to all of it, and fades."""
+
+SLOW_M_S = 1e-3
+"""Speed below which a process force fades, as the tool stands or turns back."""
 
 ROWS_AT_ONCE = 1 << 15
 """Rows that are computed together, which bounds the memory."""
@@ -97,14 +106,39 @@ def springs(program: Program, machine: Machine, legs: Floats) -> Floats:
             key=COMPENSATION, value=program.provenance.compensation,
             remedy="name the machine's file with which it was planned",
         )  # fmt: skip
+    forces = _forces(program, machine, legs)
     for part in blocks(len(legs), ROWS_AT_ONCE):
         own = legs[part]
         position, direction = machine.robot.pose(own, program.component)
         still = np.zeros_like(own)
         push = leg_pushes(machine, position, direction, still, still)
+        if program.process_force is not None:
+            loads = leg_force_map(machine.robot, position, direction, machine.tool_length)
+            push += np.einsum("nac,nc->na", loads, forces[part])
         lengths = np.linalg.norm(machine.robot.leg_vectors(position, direction), axis=-1)
         longer[part] = push * machine.stiffness.yielding(lengths)
     return longer
+
+
+def _forces(program: Program, machine: Machine, legs: Floats) -> Floats:
+    """Return the process force (N, 3) on the tip at rows of these lengths, newtons; empty where there is none.
+
+    It grows and fades within `SMOOTH_S`, so that the legs keep their limits where a cutter goes in and turns back.
+    """
+    process = program.process_force
+    if process is None:
+        return np.empty((0, 3))
+    cutting = np.zeros(len(legs), dtype=np.bool_)
+    for first, last in process.cuts:
+        cutting[first : last + 1] = True
+    position, direction = machine.robot.pose(legs, program.component)
+    velocity = np.gradient(position + machine.tool_length * direction, program.period, axis=0)
+    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    force = np.where(cutting[:, None], -process.newtons * velocity / np.hypot(speed, SLOW_M_S), 0.0)
+    rows = max(round(0.5 * SMOOTH_S / program.period), 1)
+    for _ in range(2):  # twice: a force that begins has no corner
+        force = uniform_filter1d(force, rows, axis=0, mode="nearest")
+    return force
 
 
 def commands_digest(program: Program, machine: Machine) -> str:
@@ -114,4 +148,6 @@ def commands_digest(program: Program, machine: Machine) -> str:
     masses = {item.name: getattr(machine.masses, item.name) for item in dataclasses.fields(machine.masses)}
     soft = {name: 1.0 / values for name, values in vars(machine.stiffness).items()}  # infinite ones have no text
     told = {COMPENSATION: program.provenance.compensation, "leg_model": machine.leg_model.digest}
+    if (process := program.process_force) is not None:
+        told |= {PROCESS_FORCE: process.newtons, CUT_ROWS: process.cuts}
     return digest_of({**masses, **soft, **told})

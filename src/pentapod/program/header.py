@@ -13,10 +13,11 @@ from pentapod.program.header_values import (
     box_text,
     decimal_text,
     matrix_text,
+    pairs_text,
     string_text,
     switches_text,
 )
-from pentapod.program.program import FORMAT_VERSION, Program, Provenance, Switch
+from pentapod.program.program import FORMAT_VERSION, ProcessForce, Program, Provenance, Switch
 
 MAGIC = "pentapod_program"
 KEYS = (
@@ -40,6 +41,9 @@ CALIBRATION = "calibration"
 """Key of programs for a machine as it was measured."""
 COMPENSATION = "compensation"
 """Key of programs with which drives are told more than the lengths of the legs, because legs yield to their loads."""
+PROCESS_FORCE, CUT_ROWS = "process_force_n", "cut_rows"
+FORCE_KEYS = (PROCESS_FORCE, CUT_ROWS)
+"""Keys of programs with which drives make good a force against the motion, too: newtons, and the rows of the cuts."""
 COMMANDS = "commands"
 """Key of files in which the rows are what drives are told, by a machine's leg model, and what its legs yield."""
 LEFT_OUT = "left_out"
@@ -58,6 +62,7 @@ OPTIONAL_KEYS = (
     LEGS,
     CALIBRATION,
     COMPENSATION,
+    *FORCE_KEYS,
     COMMANDS,
     GUIDES,
     *SETUP_KEYS,
@@ -85,11 +90,12 @@ class Header:
     legs: int = FiveLegs.n_legs
     switches: tuple[Switch, ...] = ()
     powered: bool = False
+    process_force: ProcessForce | None = None
 
     def program(self, legs: Floats, laser_power: Floats | None = None) -> Program:
         """Return the program of this header and its rows: legs (N, n_legs), metres, and the laser's power (N,)."""
         before = (self.period, legs, self.interpolation, self.component, self.placement, self.provenance)
-        return Program(*before, self.rail_positions, self.switches, laser_power)
+        return Program(*before, self.rail_positions, self.switches, laser_power, self.process_force)
 
 
 def header_text(program: Program) -> str:
@@ -113,6 +119,9 @@ def header_text(program: Program) -> str:
         values[CALIBRATION] = string_text(source.calibration)
     if source.compensation:
         values[COMPENSATION] = string_text(source.compensation)
+    if program.process_force is not None:
+        values[PROCESS_FORCE] = repr(float(program.process_force.newtons))
+        values[CUT_ROWS] = pairs_text(program.process_force.cuts)
     if source.commands:
         values[COMMANDS] = string_text(source.commands)
     if program.rail_positions is not None:
@@ -120,7 +129,7 @@ def header_text(program: Program) -> str:
     if source.piece is not None:
         values |= {WAYPOINTS: f"[{source.piece.first}, {source.piece.last}]", BOX: box_text(source.piece)}
     if source.left_out:
-        values[LEFT_OUT] = f"[{', '.join(f'[{first}, {last}]' for first, last in source.left_out)}]"
+        values[LEFT_OUT] = pairs_text(source.left_out)
     if source.upright:
         values[UPRIGHT] = "true"
     if program.switches:

@@ -22,6 +22,8 @@ from pentapod.program.header import (
     CALIBRATION,
     COMMANDS,
     COMPENSATION,
+    CUT_ROWS,
+    FORCE_KEYS,
     GUIDES,
     KEYS,
     LASER_POWER,
@@ -30,6 +32,7 @@ from pentapod.program.header import (
     MADE_ON,
     MAGIC,
     OPTIONAL_KEYS,
+    PROCESS_FORCE,
     SETUP_KEYS,
     SWITCHES,
     UNVERIFIED,
@@ -38,7 +41,7 @@ from pentapod.program.header import (
     Header,
 )
 from pentapod.program.header_values import bound_of, list_of, number_of, switches_of
-from pentapod.program.program import COMPENSATIONS, FORMAT_VERSION, Provenance, Switch
+from pentapod.program.program import COMPENSATIONS, FORMAT_VERSION, ProcessForce, Provenance, Switch
 from pentapod.toolpath.linking.partition import Piece
 
 LARGEST_COUNT = 2**63 - 1
@@ -70,8 +73,8 @@ def parse_header(lines: list[str], file: Path) -> Header:
         if key not in (*KEYS, *OPTIONAL_KEYS):
             remedy = "not a key of this format version: a newer pentapod wrote the file, or it was edited"
             raise ProgramError("unknown key in the header", file=file, line=number, key=key, remedy=remedy)
-    setup = SETUP_KEYS if any(key in values for key in SETUP_KEYS) else ()
-    for key in (*KEYS, *setup):
+    together = [key for keys in (SETUP_KEYS, FORCE_KEYS) for key in keys if any(each in values for each in keys)]
+    for key in (*KEYS, *together):
         if key not in values:
             raise ProgramError("the header lacks this key", file=file, key=key, remedy="plan the job again")
     return _Reader(values, places, file, unverified).header()
@@ -121,6 +124,7 @@ class _Reader:
             legs=self._legs(),
             switches=self._switches(),
             powered=self._true(LASER_POWER),
+            process_force=self._process_force(),
         )
 
     def _check(self, key: str, holds: bool, expected: str) -> None:
@@ -176,11 +180,22 @@ class _Reader:
     def _left_out(self) -> tuple[tuple[int, int], ...]:
         if LEFT_OUT not in self.values:
             return ()
-        pairs = [list_of(pair) for pair in list_of(self.values[LEFT_OUT])]
+        return self._pairs(LEFT_OUT, "waypoints", LARGEST_COUNT)
+
+    def _process_force(self) -> ProcessForce | None:
+        if PROCESS_FORCE not in self.values:
+            return None
+        newtons = number_of(self.values[PROCESS_FORCE])
+        self._check(PROCESS_FORCE, 0.0 < newtons < math.inf, "a positive number of newtons")
+        self._check(PROCESS_FORCE, COMPENSATION in self.values, f"only where there is the key {COMPENSATION}")
+        return ProcessForce(newtons, self._pairs(CUT_ROWS, "rows of this file", self._rows() - 1))
+
+    def _pairs(self, key: str, what: str, most: int) -> tuple[tuple[int, int], ...]:
+        pairs = [list_of(pair) for pair in list_of(self.values[key])]
         good = bool(pairs) and all([type(k) for k in pair] == [int, int] for pair in pairs)
         flat = [k for pair in pairs for k in pair]
-        good = good and flat == sorted(set(flat)) and flat[0] >= 0 and flat[-1] <= LARGEST_COUNT
-        self._check(LEFT_OUT, good, "pairs of increasing waypoints, [[first, last], ...]")
+        good = good and flat == sorted(set(flat)) and flat[0] >= 0 and flat[-1] <= most
+        self._check(key, good, f"pairs of increasing {what}, [[first, last], ...]")
         return tuple((first, last) for first, last in pairs)
 
     def _true(self, key: str) -> bool:

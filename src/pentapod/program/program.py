@@ -66,6 +66,18 @@ class Switch(Value):
     words: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class ProcessForce(Value):
+    """A force on the tip against its motion on cuts, newtons. cuts: first and last row of each cut, rising.
+
+    >>> ProcessForce(20.0, ((200, 4100), (4300, 8200)))
+    ProcessForce(newtons=20.0, cuts=((200, 4100), (4300, 8200)))
+    """
+
+    newtons: float
+    cuts: tuple[tuple[int, int], ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Program(Result):
     """Setpoints for the legs.
@@ -74,7 +86,8 @@ class Program(Result):
     rows, "linear", or "cubic": the C2 cubic spline with zero end velocities. component: in which the motion must stay.
     placement: workpiece → machine. rail_positions: of the guides of a reconfigurable machine, metres; None for others.
     switches: spindle, coolant and tool, in the order of their rows. laser_power (N,): share of the laser's full power
-    from each row to the next; None where nothing says it.
+    from each row to the next; None where nothing says it. process_force: that drives make good beside the weight; None
+    for none.
 
     >>> program.legs.shape[1], round(program.duration, 1) == round(trajectory.duration, 1)
     (5, True)
@@ -91,6 +104,7 @@ class Program(Result):
     rail_positions: tuple[float, ...] | None = None
     switches: tuple[Switch, ...] = ()
     laser_power: Floats | None = None
+    process_force: ProcessForce | None = None
 
     def __post_init__(self) -> None:
         set_frozen(self, legs=frozen(self.legs, "legs", (None, None)))
@@ -99,6 +113,10 @@ class Program(Result):
         rows = [switch.row for switch in self.switches]
         if rows != sorted(set(rows)) or (rows and not 0 <= rows[0] <= rows[-1] < len(self.legs)):
             raise ProgramError("switches must be in the order of their rows", key="switches", value=rows[:8])
+        if self.process_force is not None:
+            flat = [row for pair in self.process_force.cuts for row in pair]
+            if flat != sorted(flat) or (flat and not 0 <= flat[0] <= flat[-1] < len(self.legs)):
+                raise ProgramError("cuts must be in the order of their rows", key="cut_rows", value=flat[:8])
         if self.legs.ndim != 2 or len(self.legs) < 2:
             raise ProgramError("a program needs at least two rows", value=self.legs.shape)
         if not (np.isfinite(self.period) and self.period > 0.0):

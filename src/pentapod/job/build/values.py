@@ -26,6 +26,10 @@ LARGEST_TOLERANCE = 0.1
 """Largest tolerance that makes sense, as a share of the part's largest extent."""
 
 
+PROCESS = "process"
+"""Asks for compensation of gravity and of the cutting force."""
+
+
 def job_machine(job: Job, machine: Machine | None = None) -> Machine:
     """Return the machine with the job's tool length, controller settings, tool limits and cutting force.
 
@@ -54,7 +58,11 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
         remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
         what = "how far the tip deflects is not known on this machine"
         raise job.error("tolerance", "deflection_mm", what, value=deflection, remedy=remedy)
-    if job.output.compensation == GRAVITY and not can_compensate(machine):
+    asked = job.output.compensation
+    if asked == PROCESS and not cutting > 0.0:
+        what, remedy = "there is no process force to make good", "give feed.cutting_force_n, or ask for gravity alone"
+        raise job.error("output", "compensation", what, remedy=remedy)
+    if asked in (GRAVITY, PROCESS) and not can_compensate(machine):
         remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
         what = "how far the legs of this machine yield is not known"
         raise job.error("output", "compensation", what, remedy=remedy)
@@ -67,9 +75,8 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
 
 
 def job_compensation(job: Job, machine: Machine) -> str:
-    """Return what of the legs' yielding drives make good, as programs name it; machine: that of the job."""
-    asked = job.output.compensation
-    return (GRAVITY if can_compensate(machine) else "") if asked is None else asked.removeprefix("none")
+    """Return what drives make good of how legs yield, as a program's provenance names it; machine: that of the job."""
+    return GRAVITY if job.output.compensation != "none" and can_compensate(machine) else ""
 
 
 def job_mesh(job: Job, progress: Progress = silent) -> Mesh:

@@ -64,14 +64,19 @@ def deflection(replay: Replay) -> Finding | Idle:
         f"{1e6 * by_masses.min():.3g} to {1e6 * by_masses.max():.3g} µm"
     )
     if replay.made_good is not None:
-        most = float(replay.sag.max())
+        most = 1e6 * float(replay.sag.max())
         method += (
-            f"; drives make good the weight, which moves the tip by up to {1e6 * most:.3g} µm: legs that are "
-            f"{SOFTER:.0%} softer than the machine says leave {1e6 * most * SOFTER / (1.0 - SOFTER):.3g} µm at most"
+            f"; drives make good the weight{_process(replay)}, which moves the tip by up to {most:.3g} µm: legs "
+            f"that are {SOFTER:.0%} softer than the machine says leave {most * SOFTER / (1.0 - SOFTER):.3g} µm of it"
         )
     if bound is None:
         return Finding(True, MM * value, None, "mm", replay.place(2 * row), f"no bound is asked for; {method}")
     return Finding.at_most(value, bound, MM, "mm", replay.place(2 * row), f"{method}; {TOLERATED}")
+
+
+def _process(replay: Replay) -> str:
+    force = replay.program.process_force
+    return "" if force is None else f" and {force.newtons:g} N against the motion on cuts"
 
 
 CLAIMS = (
