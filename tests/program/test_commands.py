@@ -23,7 +23,7 @@ from pentapod.program.program import ProcessForce
 from usual_job import job_text
 
 LIBRARY = Path(__file__).parents[2] / "src" / "pentapod" / "machine" / "library"
-POSTS = ("csv", "npz", "ros2-yaml", "pvt")
+POSTS = ("csv", "npz", "ros2-yaml", "pvt", "linuxcnc")
 QUANTUM = 1e-11
 
 
@@ -191,3 +191,20 @@ def test_compensation_is_asked_for_in_the_job(make_job):
         job_machine(desk.with_(**{"output.compensation": "process"}))
     with pytest.raises(JobError, match=r"output\.compensation: how far the legs of this machine yield is not known"):
         job_machine(desk.with_(**{"output.compensation": "gravity"}))
+
+
+def test_a_process_force_of_the_job_is_made_good_on_its_cuts(soft_job, tmp_path, capsys):
+    text = (soft_job / "job.toml").read_text(encoding="utf-8")
+    assert "[feed]\n" in text
+    text = text.replace("[feed]\n", "[feed]\ncutting_force_n = 30\n") + '\n[output]\ncompensation = "process"\n'
+    (soft_job / "process.toml").write_text(text, encoding="utf-8")
+    out, posted = tmp_path / "out", tmp_path / "posted"
+    assert run(["plan", str(soft_job / "process.toml"), "-o", str(out)]) == 0
+    assert "weight and 30 N against the motion on cuts" in capsys.readouterr().out
+    program = read_csv(out / "program.csv")
+    assert program.process_force.newtons == 30.0
+    assert len(program.process_force.cuts) > 3
+    assert run(["post", str(out / "program.csv"), "--to", "csv", "-o", str(posted), "-q"]) == 0
+    (file,) = posted.glob("*.csv")
+    assert run(["verify", str(file), "--job", str(soft_job / "process.toml"), "-q"]) == 0
+    assert run(["simulate", str(file), "--job", str(soft_job / "process.toml"), "-q", "--within", "0.1"]) == 0

@@ -26,6 +26,7 @@ from pentapod.planning.placement.common_axes import FIXED
 from pentapod.planning.plan import PlacementOptions, fits
 from pentapod.planning.problem.constraints import FREE
 from pentapod.program import Program, Provenance, sample, write_csv
+from pentapod.program.commands import compensation_sentence
 from pentapod.program.process import with_process, with_process_force
 from pentapod.timing import Explanation, JerkOptions, Limit, Trajectory, certify, explain, retime, slow_cuts
 from pentapod.timing.jerk.options import DEFAULTS
@@ -137,7 +138,8 @@ class Task:
         trajectory = self.runner.run("timing", lambda: self._timed(path))
         if isinstance(trajectory, Refusal):
             return trajectory
-        program = self.runner.run("program", lambda: self._program(placed, trajectory, file))
+        told = partial(compensation_sentence, machine=self.machine)
+        program = self.runner.run("program", lambda: self._program(placed, trajectory, file), remark=told)
         self.runner.run(
             "explain",
             lambda: explanation(path, trajectory, program, self.machine, self.toolpath),

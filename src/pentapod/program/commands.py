@@ -42,6 +42,16 @@ ROWS_AT_ONCE = 1 << 15
 """Rows that are computed together, which bounds the memory."""
 
 
+def compensation_sentence(program: Program, machine: Machine) -> str:
+    """Return what drives make good, and by how much their lengths differ from the program's; "" for nothing."""
+    if not program.provenance.compensation:
+        return ""
+    most = 1e6 * float(np.abs(springs(program, program.machine(machine), program.legs)).max())
+    force = program.process_force
+    process = "" if force is None else f" and {force.newtons:g} N against the motion on cuts"
+    return f"posts make good what the legs yield to weight{process}: drives are told up to {most:.3g} um more or less"
+
+
 def can_compensate(machine: Machine) -> bool:
     """Return whether the machine says how far its legs yield, and the forces in them are known."""
     return machine.stiffness.given and machine.ends_on_line
