@@ -13,6 +13,7 @@ from pentapod.job.build.limits import placement_limits
 from pentapod.job.build.placed_check import Ranges, meetings, refusal_of
 from pentapod.job.build.placement import job_weights
 from pentapod.job.build.toolpath import drops_gouges
+from pentapod.job.build.values import PROCESS, job_compensation
 from pentapod.job.plan_before import PlanBefore
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import INTERRUPTED, StageRunner
@@ -25,7 +26,8 @@ from pentapod.planning.placement.common_axes import FIXED
 from pentapod.planning.plan import PlacementOptions, fits
 from pentapod.planning.problem.constraints import FREE
 from pentapod.program import Program, Provenance, sample, write_csv
-from pentapod.program.process import with_process
+from pentapod.program.commands import compensation_sentence
+from pentapod.program.process import with_process, with_process_force
 from pentapod.timing import Explanation, JerkOptions, Limit, Trajectory, certify, explain, retime, slow_cuts
 from pentapod.timing.jerk.options import DEFAULTS
 from pentapod.timing.reuse import retime_as_before
@@ -136,7 +138,8 @@ class Task:
         trajectory = self.runner.run("timing", lambda: self._timed(path))
         if isinstance(trajectory, Refusal):
             return trajectory
-        program = self.runner.run("program", lambda: self._program(placed, trajectory, file))
+        told = partial(compensation_sentence, machine=self.machine)
+        program = self.runner.run("program", lambda: self._program(placed, trajectory, file), remark=told)
         self.runner.run(
             "explain",
             lambda: explanation(path, trajectory, program, self.machine, self.toolpath),
@@ -207,9 +210,12 @@ class Task:
         machine = self.machine
         source = Provenance(
             machine.name, machine.digest, self.job.digest, __version__, self.piece, *made_on,
-            calibration=machine.calibration_name, left_out=self.left_out, upright=self.job.asked is not None,
+            calibration=machine.calibration_name, compensation=job_compensation(self.job, machine),
+            left_out=self.left_out, upright=self.job.asked is not None,
         )  # fmt: skip
         program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
         program = with_process(program, trajectory, self.toolpath)
+        if self.job.output.compensation == PROCESS:
+            program = with_process_force(program, trajectory, self.toolpath, machine.cutting_force)
         write_csv(program, file)
         return program

@@ -13,7 +13,8 @@ from pentapod.base.errors import ProgramError
 from pentapod.base.files import atomic_write
 from pentapod.base.refusal import stage
 from pentapod.program.csv_rows import POWER_DECIMALS, TimeCheck, columns_of, read_rows, rows_text
-from pentapod.program.header import MAGIC, Header, header_text, parse_header
+from pentapod.program.header import MAGIC, Header, header_text
+from pentapod.program.header_reader import parse_header
 from pentapod.program.program import FORMAT_VERSION, Program
 from pentapod.program.resolution import MM_DECIMALS, to_millimetres
 

@@ -2,35 +2,22 @@
 
 from __future__ import annotations
 
-import math
-import re
-import tomllib
 from dataclasses import dataclass
-from decimal import Decimal
-from pathlib import Path
-from typing import Any, get_args
-
-import numpy as np
+from typing import Any
 
 from pentapod.base.arrays import Floats
-from pentapod.base.errors import ArrayError, ProgramError, ToolpathError
-from pentapod.geometry.interpolant import Interpolation
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.kinematics.five_legs import FiveLegs
 from pentapod.program.header_values import (
-    bound_of,
     box_text,
     decimal_text,
-    list_of,
     matrix_text,
-    number_of,
+    pairs_text,
     string_text,
-    switches_of,
     switches_text,
 )
-from pentapod.program.program import FORMAT_VERSION, Program, Provenance, Switch
-from pentapod.toolpath.linking.partition import Piece
+from pentapod.program.program import FORMAT_VERSION, ProcessForce, Program, Provenance, Switch
 
 MAGIC = "pentapod_program"
 KEYS = (
@@ -52,8 +39,13 @@ SETUP_KEYS = (WAYPOINTS, BOX)
 """Keys of programs of several set-ups."""
 CALIBRATION = "calibration"
 """Key of programs for a machine as it was measured."""
+COMPENSATION = "compensation"
+"""Key of programs with which drives are told more than the lengths of the legs, because legs yield to their loads."""
+PROCESS_FORCE, CUT_ROWS = "process_force_n", "cut_rows"
+FORCE_KEYS = (PROCESS_FORCE, CUT_ROWS)
+"""Keys of programs with which drives make good a force against the motion, too: newtons, and the rows of the cuts."""
 COMMANDS = "commands"
-"""Key of files in which the rows are what drives are told, by a machine's leg model."""
+"""Key of files in which the rows are what drives are told, by a machine's leg model, and what its legs yield."""
 LEFT_OUT = "left_out"
 """Key of programs that leave cuts of the toolpath out: pairs of waypoints."""
 UPRIGHT = "upright"
@@ -66,12 +58,22 @@ LEGS = "legs"
 """Key of programs for machines that have not as many legs as a linear pentapod."""
 MADE_ON = ("processor", "libraries")
 """Keys of planned programs: on another kind of processor or with other libraries bits may differ."""
-OPTIONAL_KEYS = (LEGS, CALIBRATION, COMMANDS, GUIDES, *SETUP_KEYS, LEFT_OUT, UPRIGHT, SWITCHES, LASER_POWER, *MADE_ON)
+OPTIONAL_KEYS = (
+    LEGS,
+    CALIBRATION,
+    COMPENSATION,
+    *FORCE_KEYS,
+    COMMANDS,
+    GUIDES,
+    *SETUP_KEYS,
+    LEFT_OUT,
+    UPRIGHT,
+    SWITCHES,
+    LASER_POWER,
+    *MADE_ON,
+)
 UNVERIFIED = "UNVERIFIED: no verdict has passed this program"
 """First line, after the comment mark, of files written for a controller without a passed verdict."""
-LARGEST_COUNT = 2**63 - 1
-MOST_LEGS = 64
-_LINE = re.compile(r"# ([a-z0-9_]+) = (\S.*)")
 
 
 @dataclass(frozen=True)
@@ -88,11 +90,12 @@ class Header:
     legs: int = FiveLegs.n_legs
     switches: tuple[Switch, ...] = ()
     powered: bool = False
+    process_force: ProcessForce | None = None
 
     def program(self, legs: Floats, laser_power: Floats | None = None) -> Program:
         """Return the program of this header and its rows: legs (N, n_legs), metres, and the laser's power (N,)."""
         before = (self.period, legs, self.interpolation, self.component, self.placement, self.provenance)
-        return Program(*before, self.rail_positions, self.switches, laser_power)
+        return Program(*before, self.rail_positions, self.switches, laser_power, self.process_force)
 
 
 def header_text(program: Program) -> str:
@@ -114,6 +117,11 @@ def header_text(program: Program) -> str:
         values[LEGS] = str(program.legs.shape[1])
     if source.calibration:
         values[CALIBRATION] = string_text(source.calibration)
+    if source.compensation:
+        values[COMPENSATION] = string_text(source.compensation)
+    if program.process_force is not None:
+        values[PROCESS_FORCE] = repr(float(program.process_force.newtons))
+        values[CUT_ROWS] = pairs_text(program.process_force.cuts)
     if source.commands:
         values[COMMANDS] = string_text(source.commands)
     if program.rail_positions is not None:
@@ -121,7 +129,7 @@ def header_text(program: Program) -> str:
     if source.piece is not None:
         values |= {WAYPOINTS: f"[{source.piece.first}, {source.piece.last}]", BOX: box_text(source.piece)}
     if source.left_out:
-        values[LEFT_OUT] = f"[{', '.join(f'[{first}, {last}]' for first, last in source.left_out)}]"
+        values[LEFT_OUT] = pairs_text(source.left_out)
     if source.upright:
         values[UPRIGHT] = "true"
     if program.switches:
@@ -132,169 +140,3 @@ def header_text(program: Program) -> str:
     values |= {key: string_text(value) for key, value in made_on if value}
     mark = f"# {UNVERIFIED}\n" if source.unverified else ""
     return mark + "".join(f"# {key} = {value}\n" for key, value in values.items())
-
-
-def parse_header(lines: list[str], file: Path) -> Header:
-    """Return the header from its lines, which all begin with "#". Raises ProgramError with file and line."""
-    values, places = dict[str, Any](), dict[str, int]()
-    unverified = lines[:1] == [f"# {UNVERIFIED}"]
-    first = 2 if unverified else 1
-    for number, line in enumerate(lines[first - 1 :], start=first):
-        entry = _entry(line)
-        if number == first and (entry is None or entry[0] != MAGIC):
-            expected = f"# {MAGIC} = {FORMAT_VERSION}"
-            raise ProgramError("not a pentapod program", file=file, line=number, expected=expected)
-        if entry is None:
-            value, expected = line.strip()[:80], "# key = value, with one key and nothing else"
-            raise ProgramError("cannot read this header line", file=file, line=number, value=value, expected=expected)
-        key, value = entry
-        if key in values:
-            raise ProgramError("this key is in the header twice", file=file, line=number, key=key)
-        values[key], places[key] = value, number
-        # True and 1.0 equal 1, but no version is written like that.
-        if key == MAGIC and (type(value) is not int or value != FORMAT_VERSION):
-            shown, known = str(value)[:80], str(FORMAT_VERSION)
-            raise ProgramError("unknown format version", file=file, line=number, key=key, value=shown, expected=known)
-        if key not in (*KEYS, *OPTIONAL_KEYS):
-            remedy = "not a key of this format version: a newer pentapod wrote the file, or it was edited"
-            raise ProgramError("unknown key in the header", file=file, line=number, key=key, remedy=remedy)
-    setup = SETUP_KEYS if any(key in values for key in SETUP_KEYS) else ()
-    for key in (*KEYS, *setup):
-        if key not in values:
-            raise ProgramError("the header lacks this key", file=file, key=key, remedy="plan the job again")
-    return _Reader(values, places, file, unverified).header()
-
-
-def _entry(line: str) -> tuple[str, Any] | None:
-    """Return key and value of a header line; None where it is not `# key = value`, one plain key and one value."""
-    parts = _LINE.fullmatch(line.rstrip("\r"))
-    if not parts:
-        return None
-    try:
-        # As an entry of a list, so that a second key, a comment or a second value is not read as a part of the value.
-        alone = tomllib.loads(f"x = {parts[2]}", parse_float=Decimal)
-        between = tomllib.loads(f"x = [{parts[2]}]", parse_float=Decimal)["x"]
-    except (ValueError, ArithmeticError, RecursionError):  # not TOML, a number too large, nested too deep
-        return None
-    return (parts[1], alone["x"]) if len(between) == 1 else None
-
-
-@dataclass(frozen=True)
-class _Reader:
-    values: dict[str, Any]
-    places: dict[str, int]
-    file: Path
-    unverified: bool
-
-    def header(self) -> Header:
-        return Header(
-            period=self._period(),
-            interpolation=self._one_of("interpolation", get_args(Interpolation)),
-            component=Component.parse(self._one_of("component", ("++", "+-", "-+", "--"))),
-            placement=self._placement(),
-            provenance=Provenance(
-                machine=self._text("machine"),
-                machine_digest=self._text("machine_digest"),
-                job_digest=self._text("job_digest"),
-                pentapod_version=self._text("pentapod_version"),
-                piece=self._piece(),
-                left_out=self._left_out(),
-                upright=self._true(UPRIGHT),
-                unverified=self.unverified,
-                **{key: self._text(key) for key in (*MADE_ON, CALIBRATION, COMMANDS) if key in self.values},
-            ),
-            rows=self._rows(),
-            rail_positions=self._rail_positions(),
-            legs=self._legs(),
-            switches=self._switches(),
-            powered=self._true(LASER_POWER),
-        )
-
-    def _check(self, key: str, holds: bool, expected: str) -> None:
-        if not holds:
-            value = self.values[key]
-            shown = float(value) if isinstance(value, Decimal) else value
-            line = self.places[key]
-            raise ProgramError("bad value", file=self.file, line=line, key=key, value=shown, expected=expected)
-
-    def _text(self, key: str) -> str:
-        self._check(key, isinstance(self.values[key], str), "a string")
-        return self.values[key]
-
-    def _one_of(self, key: str, known: tuple[str, ...]) -> str:
-        self._check(key, self.values[key] in known, " or ".join(f'"{name}"' for name in known))
-        return self.values[key]
-
-    def _period(self) -> float:
-        period = number_of(self.values["period_s"])
-        self._check("period_s", 0.0 < period < math.inf, "a positive number of seconds")
-        return period
-
-    def _rail_positions(self) -> tuple[float, ...] | None:
-        if GUIDES not in self.values:
-            return None
-        positions = tuple(number_of(entry, shift=-3) for entry in list_of(self.values[GUIDES]))
-        good = len(positions) == self._legs() and all(map(math.isfinite, positions))
-        self._check(GUIDES, good, f"{self._legs()} numbers of mm, one for each guide")
-        return positions
-
-    def _legs(self) -> int:
-        if LEGS not in self.values:
-            return FiveLegs.n_legs
-        legs = self.values[LEGS]
-        self._check(LEGS, type(legs) is int and 1 <= legs <= MOST_LEGS, f"a count of 1 to {MOST_LEGS}")
-        return legs
-
-    def _piece(self) -> Piece | None:
-        if WAYPOINTS not in self.values:
-            return None
-        pair, corners = list_of(self.values[WAYPOINTS]), list_of(self.values[BOX])
-        good = [type(k) for k in pair] == [int, int] and max(map(abs, pair)) <= LARGEST_COUNT
-        self._check(WAYPOINTS, good, "the first and the last waypoint")
-        expected = "two opposite corners, [[x, y, z], [x, y, z]]"
-        self._check(BOX, [len(list_of(corner)) for corner in corners] == [3, 3], expected)
-        low, high = ((bound_of(x), bound_of(y), bound_of(z)) for x, y, z in corners)
-        try:
-            return Piece(pair[0], pair[1], low, high)
-        except ToolpathError:
-            self._check(BOX, False, f"{expected}, and increasing waypoints")
-            raise
-
-    def _left_out(self) -> tuple[tuple[int, int], ...]:
-        if LEFT_OUT not in self.values:
-            return ()
-        pairs = [list_of(pair) for pair in list_of(self.values[LEFT_OUT])]
-        good = bool(pairs) and all([type(k) for k in pair] == [int, int] for pair in pairs)
-        flat = [k for pair in pairs for k in pair]
-        good = good and flat == sorted(set(flat)) and flat[0] >= 0 and flat[-1] <= LARGEST_COUNT
-        self._check(LEFT_OUT, good, "pairs of increasing waypoints, [[first, last], ...]")
-        return tuple((first, last) for first, last in pairs)
-
-    def _true(self, key: str) -> bool:
-        if key in self.values:
-            self._check(key, self.values[key] is True, "true, or no such line")
-        return key in self.values
-
-    def _switches(self) -> tuple[Switch, ...]:
-        if SWITCHES not in self.values:
-            return ()
-        found = switches_of(self.values[SWITCHES], self._rows())
-        self._check(SWITCHES, bool(found), 'rising rows of this file, each with its words: [[0, "S12000", "M3"], ...]')
-        return found
-
-    def _rows(self) -> int:
-        rows = self.values["rows"]
-        self._check("rows", type(rows) is int and 2 <= rows <= LARGEST_COUNT, "a count of at least 2")
-        return rows
-
-    def _placement(self) -> RigidTransform:
-        expected = "a rigid 4x4 matrix, translation in mm"
-        rows = [list_of(row) for row in list_of(self.values["placement_mm"])]
-        self._check("placement_mm", [len(row) for row in rows] == [4, 4, 4, 4], expected)
-        shift = [[-3 if j == 3 and k < 3 else 0 for j in range(4)] for k in range(4)]
-        matrix = [[number_of(x, n) for x, n in zip(row, by, strict=True)] for row, by in zip(rows, shift, strict=True)]
-        try:
-            return RigidTransform.from_matrix(np.array(matrix))
-        except ArrayError as error:
-            key, line = "placement_mm", self.places["placement_mm"]
-            raise ProgramError(error.what, file=self.file, line=line, key=key, expected=expected) from error

@@ -89,3 +89,8 @@ def switches_of(value: Any, rows: int) -> tuple[Switch, ...]:
         if good and all(isinstance(word, str) and word.strip() and word.isprintable() for word in words)
         else ()
     )
+
+
+def pairs_text(pairs: Iterable[tuple[int, int]]) -> str:
+    """Return pairs of counts as [[first, last], ...]."""
+    return f"[{', '.join(f'[{first}, {last}]' for first, last in pairs)}]"

@@ -8,7 +8,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.errors import ProgramError
-from pentapod.program.program import Program, Switch
+from pentapod.program.program import ProcessForce, Program, Switch
 
 REST_ROWS = 24
 """Periods of rest where two programs meet.
@@ -38,12 +38,21 @@ def joined(first: Program, second: Program) -> Program:
     if first.laser_power is not None or second.laser_power is not None:
         powers = np.concatenate([_powers(first)[:-1], np.zeros(REST_ROWS), _powers(second)])
     moved = tuple(Switch(switch.row + before, switch.words) for switch in second.switches)
+    force = None
+    if (pushed := first.process_force or second.process_force) is not None:
+        cuts = (*_cuts(first), *((a + before, b + before) for a, b in _cuts(second)))
+        force = ProcessForce(pushed.newtons, cuts)
     return replace(
         first if first.switches else second,
+        process_force=force,
         legs=np.concatenate([first.legs[:-1], rest, second.legs]),
         switches=(*first.switches, *moved),
         laser_power=powers,
     )
+
+
+def _cuts(program: Program) -> tuple[tuple[int, int], ...]:
+    return () if program.process_force is None else program.process_force.cuts
 
 
 def _powers(program: Program) -> Floats:

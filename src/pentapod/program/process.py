@@ -7,10 +7,19 @@ from dataclasses import replace
 import numpy as np
 
 from pentapod.program.csv_rows import POWER_DECIMALS
-from pentapod.program.program import Program, Switch
+from pentapod.program.program import ProcessForce, Program, Switch
 from pentapod.timing.time_law.trajectory import Trajectory
 from pentapod.toolpath.process import laser_power
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
+
+
+def with_process_force(program: Program, trajectory: Trajectory, toolpath: Toolpath, newtons: float) -> Program:
+    """Return a program whose drives make good a force against the motion on the cuts of its toolpath."""
+    kinds = np.array([segment.kind is SegmentKind.CUT for segment in toolpath.segments])
+    cutting = kinds[np.asarray(trajectory.segment(program.times[:-1] + 0.5 * program.period))]
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], cutting, [False]])))
+    cuts = tuple((int(first), int(end) - 1) for first, end in edges.reshape(-1, 2) if end - first > 1)
+    return replace(program, process_force=ProcessForce(newtons, cuts)) if cuts else program
 
 
 def with_process(program: Program, trajectory: Trajectory, toolpath: Toolpath) -> Program:

@@ -20,6 +20,9 @@ from pentapod.program.resolution import to_millimetres
 from pentapod.toolpath.linking.partition import Piece
 
 FORMAT_VERSION = 1
+GRAVITY = "gravity"
+COMPENSATIONS = (GRAVITY,)
+"""Loads to which legs yield and which the drives can make good."""
 
 
 @dataclass(frozen=True)
@@ -28,10 +31,10 @@ class Provenance(Value):
 
     piece: of the toolpath, where the program is one of several set-ups. processor, libraries: with which it was made;
     with the same ones it is the same to the bit. unverified: it was written for a controller without a passed verdict.
-    calibration: name of the machine's calibration, "" where there is none. commands: digest of the leg model by which
-    the rows are commands of drives; "" where they are readings of the legs. left_out: pairs of waypoints of the job's
-    toolpath between which it makes no cut. upright: whether the tool stands along the view, though the job lets it
-    lean.
+    calibration: name of the machine's calibration, "" where there is none. compensation: "gravity" where drives are to
+    be told what the legs yield to it, else "". commands: digest of all by which the rows are commands of drives; ""
+    where they are readings of the legs. left_out: pairs of waypoints of the job's toolpath between which it makes no
+    cut. upright: whether the tool stands along the view, though the job lets it lean.
 
     >>> source = Provenance(machine.name, machine.digest, "", "0.1.0")
     """
@@ -45,6 +48,7 @@ class Provenance(Value):
     libraries: str = ""
     unverified: bool = False
     calibration: str = ""
+    compensation: str = ""
     commands: str = ""
     left_out: tuple[tuple[int, int], ...] = ()
     upright: bool = False
@@ -62,6 +66,18 @@ class Switch(Value):
     words: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class ProcessForce(Value):
+    """A force on the tip against its motion on cuts, newtons. cuts: first and last row of each cut, rising.
+
+    >>> ProcessForce(20.0, ((200, 4100), (4300, 8200)))
+    ProcessForce(newtons=20.0, cuts=((200, 4100), (4300, 8200)))
+    """
+
+    newtons: float
+    cuts: tuple[tuple[int, int], ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Program(Result):
     """Setpoints for the legs.
@@ -70,7 +86,8 @@ class Program(Result):
     rows, "linear", or "cubic": the C2 cubic spline with zero end velocities. component: in which the motion must stay.
     placement: workpiece → machine. rail_positions: of the guides of a reconfigurable machine, metres; None for others.
     switches: spindle, coolant and tool, in the order of their rows. laser_power (N,): share of the laser's full power
-    from each row to the next; None where nothing says it.
+    from each row to the next; None where nothing says it. process_force: that drives make good beside the weight; None
+    for none.
 
     >>> program.legs.shape[1], round(program.duration, 1) == round(trajectory.duration, 1)
     (5, True)
@@ -87,6 +104,7 @@ class Program(Result):
     rail_positions: tuple[float, ...] | None = None
     switches: tuple[Switch, ...] = ()
     laser_power: Floats | None = None
+    process_force: ProcessForce | None = None
 
     def __post_init__(self) -> None:
         set_frozen(self, legs=frozen(self.legs, "legs", (None, None)))
@@ -95,6 +113,10 @@ class Program(Result):
         rows = [switch.row for switch in self.switches]
         if rows != sorted(set(rows)) or (rows and not 0 <= rows[0] <= rows[-1] < len(self.legs)):
             raise ProgramError("switches must be in the order of their rows", key="switches", value=rows[:8])
+        if self.process_force is not None:
+            flat = [row for pair in self.process_force.cuts for row in pair]
+            if flat != sorted(flat) or (flat and not 0 <= flat[0] <= flat[-1] < len(self.legs)):
+                raise ProgramError("cuts must be in the order of their rows", key="cut_rows", value=flat[:8])
         if self.legs.ndim != 2 or len(self.legs) < 2:
             raise ProgramError("a program needs at least two rows", value=self.legs.shape)
         if not (np.isfinite(self.period) and self.period > 0.0):

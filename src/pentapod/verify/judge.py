@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -15,6 +16,7 @@ from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import stage
 from pentapod.machine.machine import Machine
 from pentapod.numerics.threads import in_threads
+from pentapod.program.commands import read_back
 from pentapod.program.csv import read_csv
 from pentapod.program.program import Program
 from pentapod.toolpath.toolpath import Toolpath
@@ -42,6 +44,8 @@ from pentapod.verify.verdict.verdict import Certificate, NotJudged, Place, Verdi
 
 READABLE = "readable"
 MACHINE = "machine"
+UNDONE = "the rows are what drives are told: judged are the lengths that the legs then have"
+"""What is said of a program with commands."""
 CLAIMS: tuple[Claim, ...] = (
     *provenance.CLAIMS,
     *set_up.CLAIMS,
@@ -125,6 +129,10 @@ def judged(
         return Verdict(
             (*read, _certificate(provenance.GUIDES if fits else MACHINE, False, str(error))), sources=sources
         )
+    if program.provenance.commands:
+        with suppress(InputError):  # by another machine: the claim on the machine fails
+            program = read_back(program, specification.machine)
+            read = [replace(each, method=f"{each.method}; {UNDONE}") for each in read]
     replay, unjudged = Replay(program, specification, progress), list[NotJudged]()
     _ = replay.interval_bounds  # first, because its progress is the first share
     around = collisions.claims(specification.collision_world, len(specification.machine.bars.names))

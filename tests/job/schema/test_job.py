@@ -199,7 +199,7 @@ def test_auto_axes_that_tool_or_file_do_not_allow(make_job, changes, pieces):
 def test_every_key_is_described_and_has_its_unit():
     unitless = {
         "mesh", "unit", "scale", "repair", "flip", "region_direction", "name", "file", "type", "strategy", "pattern",
-        "mode",
+        "mode", "compensation",
         "matrix", "component", "interpolation", "solver", "format", "direction", "line", "directions", "remedy", "up",
         "then", "setups", "weight_strokes", "weight_singularities", "weight_joints", "weight_bodies",
         "entry", "fill", "upright", "curve", "form", "which", "laying", "centred", "text", "letter_spacing", "align",

@@ -11,9 +11,11 @@ import pytest
 from recorded_logs import log_of, paced, with_errors
 
 from pentapod.base.errors import InputError
-from pentapod.machine import Machine
+from pentapod.machine import Machine, Stiffness
 from pentapod.program import Program
+from pentapod.program.commands import commanded
 from pentapod.program.posts.motion import lengths_at
+from pentapod.program.program import ProcessForce
 from pentapod.simulate import Reference, simulate_servo
 from pentapod.simulate.forces import leg_loads
 from pentapod.simulate.recorded.comparison import compare
@@ -209,6 +211,20 @@ def test_commands_of_a_leg_model_are_read_as_legs(reference) -> None:
     assert np.abs(told - program.legs).max() > 20.0 * UM
     run = compare(log_of(program.times, told), Reference(program, machine))
     assert measure(run, "leg error").largest < 1e-6
+
+
+@pytest.mark.parametrize("force", [None, ProcessForce(50.0, ((100, 1400), (1600, 2900)))])
+def test_what_drives_make_good_is_taken_out(reference, force) -> None:
+    """Legs that yield: the drives count more than the length of a leg under its load."""
+    stiffness = Stiffness(leg_stiffness=np.full(5, 10e6))
+    machine = dataclasses.replace(reference.machine, stiffness=stiffness)
+    source = dataclasses.replace(reference.program.provenance, compensation="gravity")
+    program = dataclasses.replace(reference.program, provenance=source, process_force=force)
+    told = commanded(program, machine)
+    assert np.abs(told.legs - program.legs).max() > 3.0 * UM
+    run = compare(log_of(program.times, told.legs), Reference(program, machine))
+    most = 1e-6 if force is None else 0.1 * 1e3 * np.abs(told.legs - program.legs).max()  # mm; the place is not exact
+    assert measure(run, "leg error").largest < most
 
 
 @pytest.mark.parametrize("name", ["hexa", "prpu", "bench-general"])

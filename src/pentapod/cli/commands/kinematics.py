@@ -133,10 +133,12 @@ def _tool_path(file: Path, job: Path | None, machine_name: str | None) -> dict[s
     """Return times, tips and axes (from the tip to the spindle) of a program's rows in the frame of the part."""
     from pentapod.cli.commands.post import program_machine
     from pentapod.program import read_csv
+    from pentapod.program.commands import read_back
     from pentapod.program.posts import PostInput
 
     program = read_csv(file)
     machine = PostInput(program, program_machine(program, file.parent, job, machine_name)).the_machine()
+    program = read_back(program, machine)
     position, direction = machine.robot.pose(program.legs, program.component)
     home = program.placement.inverse()
     tips, axes = home.apply(position + machine.tool_length * direction) * 1e3, home.rotate(-direction)

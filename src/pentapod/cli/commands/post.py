@@ -170,7 +170,7 @@ def _restarted(program: Path, begin: str, name: str, out: Path, job: Path | None
 
 
 def program_machine(program: Program, folder: Path, job: Path | None, machine: str | None) -> Machine | None:
-    """Return the named machine, the shipped one that the program names, or that of the run in a folder; else None."""
+    """Return the named machine, that of the run in a folder, or the shipped one that the program names; else None."""
     from pentapod.base.errors import MachineError
     from pentapod.job.build.values import job_machine
     from pentapod.job.plan_arrays import job_file_of
@@ -179,14 +179,10 @@ def program_machine(program: Program, folder: Path, job: Path | None, machine: s
 
     if job is None and machine is not None:
         return Machine.load(machine)
-    if job is None:
-        try:
-            shipped = Machine.load(program.provenance.machine)
-        except MachineError:
-            shipped = None
-        if shipped is not None and shipped.digest == program.provenance.machine_digest:
-            return shipped
-        job = job_file_of(folder)
-        if job is None:
-            return shipped
-    return job_machine(Job.load(job))
+    job = job_file_of(folder) if job is None else job  # its machine may have springs and screws that no digest knows
+    if job is not None:
+        return job_machine(Job.load(job))
+    try:
+        return Machine.load(program.provenance.machine)
+    except MachineError:
+        return None

@@ -55,6 +55,7 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
     from pentapod.job.build.values import job_machine, job_mesh
     from pentapod.job.schema.job import Job
     from pentapod.program import read_csv
+    from pentapod.program.commands import read_back
     from pentapod.program.posts import PostInput
     from pentapod.simulate import Reference, load_mujoco
 
@@ -63,7 +64,8 @@ def simulate(ctx: click.Context, program: Path, job: Path, as_json: bool, quiet:
     if engine == "mujoco":
         load_mujoco()  # fails at once where it is not installed
     read, loaded = read_csv(program), Job.load(job)
-    reference = Reference(read, PostInput(read, job_machine(loaded)).the_machine())
+    machine = PostInput(read, job_machine(loaded)).the_machine()
+    reference = Reference(read_back(read, machine), machine)
     same_job = read.provenance.job_digest == loaded.digest
     with progress_bar(quiet=quiet or as_json) as progress:
         progress("toolpath", 0.0)

@@ -54,6 +54,7 @@ def monitor(
     from pentapod.job.plan_arrays import job_file_of
     from pentapod.job.schema.job import Job
     from pentapod.program import read_csv
+    from pentapod.program.commands import read_back
     from pentapod.program.posts import placed_toolpath
     from pentapod.simulate import Reference
     from pentapod.simulate.recorded.comparison import compare
@@ -67,7 +68,8 @@ def monitor(
         read = read_csv(file)
         job = job_file_of(file.parent) if job is None and machine is None else job
         asked = None if job is None else Job.load(job).tolerance
-        reference = Reference(read, _machine(read, file.parent, job, machine))
+        used = _machine(read, file.parent, job, machine)
+        reference = Reference(read_back(read, used), used)
         progress("reading", 0.5, log.name)
         recorded = read_log(log, read.legs.shape[1], 1e-3 * period_ms if period_ms else read.period, columns)
         progress("comparing", 0.0)

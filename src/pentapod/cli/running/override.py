@@ -52,8 +52,8 @@ def override(
 
     from pentapod.cli.commands.post import program_machine
     from pentapod.program import read_csv
+    from pentapod.program.commands import commanded
     from pentapod.program.posts import PostInput
-    from pentapod.program.posts.registry import commanded
     from pentapod.simulate.paced import Player
 
     steps = [_change(text) for text in changes]

@@ -16,12 +16,18 @@ from pentapod.machine.machine import Machine
 from pentapod.machine.parts import ControllerSettings, ToolLimits
 from pentapod.mesh.io.load import load_mesh
 from pentapod.mesh.mesh import Mesh
+from pentapod.program.commands import can_compensate
+from pentapod.program.program import GRAVITY
 from pentapod.toolpath.axis.orientation import Orientation
 from pentapod.toolpath.gouge.report import GougeOptions
 from pentapod.toolpath.strategies.registry import STRATEGIES
 
 LARGEST_TOLERANCE = 0.1
 """Largest tolerance that makes sense, as a share of the part's largest extent."""
+
+
+PROCESS = "process"
+"""Asks for compensation of gravity and of the cutting force."""
 
 
 def job_machine(job: Job, machine: Machine | None = None) -> Machine:
@@ -52,12 +58,25 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
         remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
         what = "how far the tip deflects is not known on this machine"
         raise job.error("tolerance", "deflection_mm", what, value=deflection, remedy=remedy)
+    asked = job.output.compensation
+    if asked == PROCESS and not cutting > 0.0:
+        what, remedy = "there is no process force to make good", "give feed.cutting_force_n, or ask for gravity alone"
+        raise job.error("output", "compensation", what, remedy=remedy)
+    if asked in (GRAVITY, PROCESS) and not can_compensate(machine):
+        remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
+        what = "how far the legs of this machine yield is not known"
+        raise job.error("output", "compensation", what, remedy=remedy)
     try:
         return dataclasses.replace(
             machine, controller=controller, tool_length=length, tool_limits=limits, cutting_force=cutting
         )
     except MachineError as error:
         raise job.error("tool", "length_mm", error.what) from error
+
+
+def job_compensation(job: Job, machine: Machine) -> str:
+    """Return what drives make good of how legs yield, as a program's provenance names it; machine: that of the job."""
+    return GRAVITY if job.output.compensation != "none" and can_compensate(machine) else ""
 
 
 def job_mesh(job: Job, progress: Progress = silent) -> Mesh:

@@ -166,6 +166,8 @@ class Job(Value):
             del content["limits"]
         if not self.feed.cutting_force_n:
             del content["feed"]["cutting_force_n"]
+        if self.output.compensation is None:
+            del content["output"]["compensation"]
         if self.tolerance.deflection_mm is None:
             del content["tolerance"]["deflection_mm"]
         if all(value is None for value in content["process"].values()):

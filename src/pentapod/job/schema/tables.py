@@ -179,6 +179,14 @@ class OutputKeys:
 
     period: Annotated[float | None, Key("ms", "time between rows", ge=0.1, le=100.0)] = None
     interpolation: Annotated[Literal["linear", "cubic"] | None, Key("", "how the controller moves between rows")] = None
+    compensation: Annotated[
+        Literal["none", "gravity", "process"] | None,
+        Key(
+            "",
+            "what drives make good because legs yield to it: gravity, or gravity and feed.cutting_force_n against the "
+            "motion on cuts (process); gravity when left out, on machines that give the stiffness of their legs",
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)

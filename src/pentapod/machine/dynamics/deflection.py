@@ -43,6 +43,13 @@ class Yielding(Value):
         )
 
 
+def tip_shift(machine: Machine, position: Floats, direction: Floats, shorter: Floats) -> Floats:
+    """Return how far the tip moves (N, 3), metres, to first order, as legs get shorter (N, n_legs), metres."""
+    loads = leg_force_map(machine.robot, position, direction, machine.tool_length)
+    # Virtual work: shift = -loads^T (change of length).
+    return np.einsum("nac,na->nc", loads, shorter)
+
+
 def leg_pushes(machine: Machine, position: Floats, direction: Floats, rates: Floats, accelerations: Floats) -> Floats:
     """Return the forces (N, n_legs) with which legs hold and move platform and rods, newtons; a push is positive.
 

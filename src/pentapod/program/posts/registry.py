@@ -7,17 +7,15 @@ from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 
-import numpy as np
-
 from pentapod.base.errors import InputError
 from pentapod.base.registry import Registry
 from pentapod.base.values import Value
 from pentapod.machine.machine import Machine
+from pentapod.program.commands import commanded, read_back
 from pentapod.program.csv import csv_bytes
 from pentapod.program.posts.files import write_files
 from pentapod.program.posts.verified import VerdictContent, check_passed, marked_unverified
 from pentapod.program.program import Program
-from pentapod.program.resolution import quantised
 from pentapod.toolpath.toolpath import Toolpath
 
 LASER_POWER = "laser power"
@@ -69,7 +67,7 @@ class Post(Value):
     starts with "#!" becomes an executable file. read: from the folder to the program, or to the toolpath where the post
     writes that; raises ProgramError or ToolpathError with file and line. loses: what cannot be read back, in words.
     takes_toolpath: whether the post needs the toolpath as well as the program. readings: whether its rows are what the
-    legs read, not what drives with a leg model are told.
+    legs read, not what drives are told.
     """
 
     name: str
@@ -146,25 +144,3 @@ def read_post(folder: str | Path, name: str, machine: Machine | None = None) -> 
     post = find_post(name)
     found = post.read(Path(folder))
     return found if machine is None or post.readings or not isinstance(found, Program) else read_back(found, machine)
-
-
-def commanded(program: Program, machine: Machine | None) -> Program:
-    """Return a program with rows as the drives are told them: the one place where a machine's leg model is applied."""
-    if machine is None or not machine.leg_model.is_needed or program.provenance.commands:
-        return program
-    legs = program.machine(machine).commands(program.legs, np.array(program.component))
-    source = replace(program.provenance, commands=machine.leg_model.digest)
-    return replace(program, legs=quantised(legs), provenance=source)
-
-
-def read_back(program: Program, machine: Machine) -> Program:
-    """Return a program with rows as the legs read, of one with commands. Raises InputError: another leg model's."""
-    if not machine.leg_model.is_needed:
-        return program
-    if program.provenance.commands not in ("", machine.leg_model.digest):  # "": a format that loses it
-        raise InputError(
-            "the rows are commands of another leg model", key="commands", value=program.provenance.commands,
-            expected=machine.leg_model.digest, remedy="name the machine's file with which it was posted",
-        )  # fmt: skip
-    legs = program.machine(machine).readings(program.legs, np.array(program.component))
-    return replace(program, legs=quantised(legs), provenance=replace(program.provenance, commands=""))

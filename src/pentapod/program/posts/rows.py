@@ -13,7 +13,8 @@ from pentapod.base.arrays import Floats
 from pentapod.base.errors import ProgramError
 from pentapod.base.files import read_bytes
 from pentapod.program.csv_rows import POWER
-from pentapod.program.header import Header, parse_header
+from pentapod.program.header import Header
+from pentapod.program.header_reader import parse_header
 from pentapod.program.program import Program
 from pentapod.program.resolution import LARGEST_M, quantised
 

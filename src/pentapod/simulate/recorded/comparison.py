@@ -11,7 +11,10 @@ from pentapod.base.arrays import Bools, Floats
 from pentapod.base.errors import InputError
 from pentapod.geometry.directions import angle_between
 from pentapod.machine.dynamics.dynamics import Dynamics
+from pentapod.machine.machine import Machine
+from pentapod.program.commands import commands_digest, readings, springs
 from pentapod.program.posts.motion import lengths_at
+from pentapod.program.program import Program
 from pentapod.simulate.measures import Measure, contour_errors, on_cuts
 from pentapod.simulate.recorded.alignment import Alignment, align
 from pentapod.simulate.recorded.leg_errors import LegErrors
@@ -47,7 +50,7 @@ def compare(
     """Return a log compared with its program. toolpath: as placed, which says where the program cuts.
 
     tolerance: metres, of the program against the toolpath, to match them. The log's lengths are those of the drives;
-    where the machine has a leg model, it makes readings of them. Raises InputError: another program's log, a wrong
+    leg model and compensation are undone. Raises InputError: another program's log, a wrong
     unit, legs without a pose.
 
     >>> run = compare(read_log("log.csv", 5, program.period), reference)  # doctest: +SKIP
@@ -58,7 +61,10 @@ def compare(
     log = _readings(log, reference)
     aligned = align(log, program)
     part = slice(aligned.first, aligned.last)
-    times, legs = log.times[part], log.legs[part]
+    times, legs, commands = log.times[part], log.legs[part], None if log.commands is None else log.commands[part]
+    if program.process_force is not None:
+        forced = _by_process(program, machine, aligned.places)
+        legs, commands = legs - forced, None if commands is None else commands - forced
     position, direction = machine.robot.pose(legs, program.component)
     lost = np.flatnonzero(~np.isfinite(position).all(axis=1))
     if len(lost):
@@ -75,7 +81,6 @@ def compare(
         Measure("contour error", "mm", 1e3 * contour, "tip to the programmed path, at any time"),
         Measure("axis error", "deg", np.degrees(turned), "axis to the programmed one at that point"),
     ]
-    commands = None if log.commands is None else log.commands[part]
     timed = legs if commands is None else commands
     where, start = _due_times(times, timed, aligned, reference)
     wanted = lengths_at(program, where)
@@ -110,15 +115,23 @@ def compare(
 
 def _readings(log: RunLog, reference: Reference) -> RunLog:
     """Return a log with what the legs read, of one with what their drives count."""
-    machine, component = reference.machine, np.array(reference.program.component)
-    if not machine.leg_model.is_needed:
+    if not commands_digest(reference.program, reference.machine):
         return log
 
+    steady = replace(reference.program, process_force=None)  # that depends on the row: see `_by_process`
+
     def read(values: Floats) -> Floats:
-        found = machine.readings(values, component)
+        found = readings(steady, reference.machine, values)
         return np.where(np.isfinite(found), found, values)  # far from the program, where no pose is
 
     return replace(log, legs=read(log.legs), commands=None if log.commands is None else read(log.commands))
+
+
+def _by_process(program: Program, machine: Machine, places: Floats) -> Floats:
+    """Return how much longer drives are told legs (n, n_legs) at places in a program, because of its process force."""
+    steady = replace(program, process_force=None)
+    more = springs(program, machine, program.legs) - springs(steady, machine, program.legs)
+    return np.stack([np.interp(places, np.arange(len(more)), leg) for leg in more.T], axis=1)
 
 
 def _rates(reference: Reference, times: Floats) -> Floats:

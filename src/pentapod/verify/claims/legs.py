@@ -11,6 +11,7 @@ from pentapod.verify.replay.replay import Replay
 from pentapod.verify.verdict.verdict import Place
 
 _EXACT = "exact extreme values of the controller's polynomials, at the rows and between them"
+_TOLD = "; of the lengths that drives are told, which make good what the legs yield"
 
 
 def shortest(replay: Replay) -> Finding:
@@ -18,7 +19,7 @@ def shortest(replay: Replay) -> Finding:
     found, limit = replay.interval_bounds.shortest, replay.machine.legs.min_length
     leg = int(np.argmin(-found.values - limit))
     value, bound = -float(found.values[leg]), float(limit[leg])
-    where, method = _place(replay, found, leg), nearest_leg(leg, _EXACT)
+    where, method = _place(replay, found, leg), nearest_leg(leg, _of(replay, _EXACT))
     return Finding(value >= bound, MM * value, MM * bound, "mm", where, method, at_least=True)
 
 
@@ -27,7 +28,8 @@ def longest(replay: Replay) -> Finding:
     found, limit = replay.interval_bounds.longest, replay.machine.legs.max_length
     leg = int(np.argmax(found.values - limit))
     value, bound = float(found.values[leg]), float(limit[leg])
-    return Finding(value <= bound, MM * value, MM * bound, "mm", _place(replay, found, leg), nearest_leg(leg, _EXACT))
+    where, method = _place(replay, found, leg), nearest_leg(leg, _of(replay, _EXACT))
+    return Finding(value <= bound, MM * value, MM * bound, "mm", where, method)
 
 
 def rate(replay: Replay) -> Finding:
@@ -62,12 +64,17 @@ def _below(replay: Replay, found: RunningMaximum, limit: Floats, unit: str, meth
     leg = int(np.argmax(found.values / limit))
     value, bound = float(found.values[leg]), float(limit[leg])
     return Finding.at_most(
-        value, bound, MM, unit, _place(replay, found, leg), nearest_leg(leg, f"{method}; {TOLERATED}")
+        value, bound, MM, unit, _place(replay, found, leg), nearest_leg(leg, f"{_of(replay, method)}; {TOLERATED}")
     )
 
 
 def _place(replay: Replay, found: RunningMaximum, leg: int) -> Place:
     return replay.place(2 * int(found.at[leg]))
+
+
+def _of(replay: Replay, method: str) -> str:
+    """Return how a claim on the legs was judged, with whose lengths they are where drives are told others."""
+    return method if replay.made_good is None else f"{method}{_TOLD}"
 
 
 def nearest_leg(leg: int, method: str) -> str:

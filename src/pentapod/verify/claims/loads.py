@@ -8,6 +8,9 @@ from pentapod.verify.claims.legs import nearest_leg
 from pentapod.verify.replay.claim import MM, TOLERATED, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
 
+SOFTER = 0.2
+"""By which legs may be softer than a machine's file says, for what is told of compensation."""
+
 
 def force(replay: Replay) -> Finding | Idle:
     """Judge the force that each drive needs at the rows against what it has there."""
@@ -60,9 +63,20 @@ def deflection(replay: Replay) -> Finding | Idle:
         f"towards about ({told}) in the machine's frame; weight and acceleration alone move it by "
         f"{1e6 * by_masses.min():.3g} to {1e6 * by_masses.max():.3g} µm"
     )
+    if replay.made_good is not None:
+        most = 1e6 * float(replay.sag.max())
+        method += (
+            f"; drives make good the weight{_process(replay)}, which moves the tip by up to {most:.3g} µm: legs "
+            f"that are {SOFTER:.0%} softer than the machine says leave {most * SOFTER / (1.0 - SOFTER):.3g} µm of it"
+        )
     if bound is None:
         return Finding(True, MM * value, None, "mm", replay.place(2 * row), f"no bound is asked for; {method}")
     return Finding.at_most(value, bound, MM, "mm", replay.place(2 * row), f"{method}; {TOLERATED}")
+
+
+def _process(replay: Replay) -> str:
+    force = replay.program.process_force
+    return "" if force is None else f" and {force.newtons:g} N against the motion on cuts"
 
 
 CLAIMS = (

@@ -6,6 +6,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.geometry.polyline import arc_length
+from pentapod.program.commands import can_compensate
 from pentapod.toolpath.process import laser_power
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
@@ -20,7 +21,12 @@ def machine(replay: Replay) -> Finding:
     made_for, judged = replay.program.provenance, replay.machine
     if made_for.commands:
         return Finding.without_value(
-            False, "header: the rows are commands of drives; judge the program that was posted"
+            False,
+            "header: the rows are commands of drives, by a leg model, stiffness or weight of another machine",
+        )
+    if made_for.compensation and not can_compensate(judged):
+        return Finding.without_value(
+            False, f"header: compensation of {made_for.compensation}, but the machine does not say how far legs yield"
         )
     passed = made_for.machine == judged.name and made_for.machine_digest == judged.digest
     made = f"header: made for {_named(made_for.machine, made_for.machine_digest, made_for.calibration)}"

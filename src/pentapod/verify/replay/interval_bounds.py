@@ -117,15 +117,19 @@ def interval_bounds(
     leg_error: float,
     progress: Callable[[float], None],
     block: int = 4096,
+    told: Floats | None = None,
 ) -> IntervalBounds:
     """Return the interval bounds of a program.
 
+    told (N, n_legs): lengths that the drives are told in place of the rows; the extremes of the legs are theirs.
     tilt_centre: metres from the tip along the tool axis. leg_error: metres; the component must be kept even if each leg
     is off by so much, because legs that pass through a singularity look like legs that turn back just before it.
     progress: is called with the share that is done. block: intervals of a block.
     """
     count = len(program.legs) - 1
-    slopes = clamped_slopes(program.legs) if program.interpolation == "cubic" else None
+    cubic = program.interpolation == "cubic"
+    slopes = clamped_slopes(program.legs) if cubic else None
+    drives = None if told is None else (told, clamped_slopes(told) if cubic else None)
     found = IntervalBounds(
         position=np.empty((2 * count + 1, 3)),
         direction=np.empty((2 * count + 1, 3)),
@@ -135,7 +139,7 @@ def interval_bounds(
     )
 
     def proven(intervals: slice) -> _Block:
-        return _Block.of(intervals, program, slopes, machine, tilt_centre, leg_error)
+        return _Block.of(intervals, program, slopes, machine, tilt_centre, leg_error, drives)
 
     for part in in_threads(proven, blocks(count, block)):
         progress(part.intervals.start / count)
@@ -163,18 +167,24 @@ class _Block:
         machine: Machine,
         tilt_centre: float,
         leg_error: float,
+        drives: tuple[Floats, Floats | None] | None,
     ) -> _Block:
         from pentapod.verify.replay.leg_kernels import extremes, halve  # noqa: PLC0415  loads numba
 
         # One interval more on each side: accelerations and jerks look across the rows.
         low, high = max(intervals.start - 1, 0), min(intervals.stop + 1, len(program.legs) - 1)
         rows = slice(low, high + 1)
-        wide = Interpolant.along(program.legs[rows], None if slopes is None else slopes[rows], program.period).bernstein
+
+        def between(legs: Floats, slopes: Floats | None) -> Floats:
+            return Interpolant.along(legs[rows], None if slopes is None else slopes[rows], program.period).bernstein
+
+        wide = between(program.legs, slopes)
         inner = slice(intervals.start - low, intervals.stop - low)
         part, robot = wide[inner], machine.robot
         extents = (LEG_MEASURES, robot.n_legs)
         legs = np.full(extents, -np.inf), np.zeros(extents, dtype=np.intp)
-        extremes(wide, inner.start, inner.stop, intervals.start, program.period, *legs)
+        told = wide if drives is None else between(*drives)
+        extremes(told, inner.start, inner.stop, intervals.start, program.period, *legs)
         halves, samples = np.empty((2 * len(part), *part.shape[1:])), np.empty((2 * len(part) + 1, part.shape[1]))
         halve(part, halves, samples)
         position, direction = robot.pose(samples, program.component)

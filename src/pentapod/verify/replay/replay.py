@@ -14,16 +14,17 @@ from pentapod.base.values import Value
 from pentapod.geometry.interpolant import clamped_slopes
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.machine.dynamics.deflection import Yielding, leg_pushes
+from pentapod.machine.dynamics.deflection import Yielding, leg_pushes, tip_shift
 from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
+from pentapod.program.commands import can_compensate, springs
 from pentapod.program.program import Program
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 from pentapod.verify.replay.free_space import PosedPolyline
 from pentapod.verify.replay.interval_bounds import IntervalBounds, interval_bounds
 from pentapod.verify.replay.path_matching import OPTIONS as MATCHING
 from pentapod.verify.replay.path_matching import PathMatch, match
-from pentapod.verify.replay.row_forces import RowForces, motion_of_rows
+from pentapod.verify.replay.row_forces import ROWS_AT_ONCE, RowForces, motion_of_rows
 from pentapod.verify.verdict.specification import Specification
 from pentapod.verify.verdict.verdict import Place
 
@@ -71,7 +72,18 @@ class Replay(Value):
         def progress(share: float) -> None:
             self.progress("verify", REPLAY_SHARE * share, "between the rows")
 
-        return interval_bounds(self.program, self.machine, self.toolpath.tilt_centre, self.path_tolerance, progress)
+        more = self.made_good
+        return interval_bounds(
+            self.program, self.machine, self.toolpath.tilt_centre, self.path_tolerance, progress,
+            told=None if more is None else self.program.legs + more,
+        )  # fmt: skip
+
+    @cached_property
+    def made_good(self) -> Floats | None:
+        """By how much drives are told more than the rows (N, n_legs), because legs yield, metres; None for nothing."""
+        if not (self.program.provenance.compensation and can_compensate(self.machine)):
+            return None
+        return springs(self.program, self.machine, self.program.legs)
 
     @cached_property
     def slopes(self) -> Floats | None:
@@ -136,13 +148,29 @@ class Replay(Value):
 
     @cached_property
     def yielding(self) -> Yielding:
-        """How far the tip moves at the rows because the legs yield to masses. Needs a pose at every row."""
+        """How far the tip moves at the rows because the legs yield to masses. Needs a pose at every row.
+
+        What drives make good is not in it.
+        """
         (position, direction), found = (pose[::2] for pose in self.pose), list[Yielding]()
         for part, rates, accelerations in motion_of_rows(self.program, self.slopes):
             poses = position[part], direction[part]
             push = leg_pushes(self.machine, *poses, rates, accelerations)
+            if self.made_good is not None:
+                still = np.zeros_like(rates)
+                push -= leg_pushes(self.machine, *poses, still, still)
             found.append(Yielding.of(self.machine, *poses, push))
         return Yielding(*(np.concatenate([getattr(each, name) for each in found]) for name in vars(found[0])))
+
+    @cached_property
+    def sag(self) -> Floats:
+        """How far the tip (N,) would move at the rows by what drives make good, metres; 0 where that is nothing."""
+        (position, direction), found = (pose[::2] for pose in self.pose), np.zeros(len(self.program.legs))
+        if (more := self.made_good) is not None:
+            for part in blocks(len(found), ROWS_AT_ONCE):
+                shift = tip_shift(self.machine, position[part], direction[part], more[part])
+                found[part] = np.linalg.norm(shift, axis=1)
+        return found
 
     def cuts(self) -> Bools:
         """Return the rows (N,) on a cut and farther than the path tolerance from its ends."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from pentapod.base.errors import MachineError
+from pentapod.program.commands import commanded
 from pentapod.program.posts.drives import HALSTREAMER
 from pentapod.program.posts.linuxcnc import kinematics, player, stream, trivkins
 from pentapod.program.posts.linuxcnc.config import packaged
@@ -14,22 +16,28 @@ from pentapod.toolpath.toolpath import Toolpath
 
 __all__ = ["LINUXCNC", "kinematics", "player", "stream", "trivkins"]
 
+NOT_COMPENSATED = (
+    "The other three folders make good what the legs yield to their loads. This one does not: the tip moves by that.\n"
+)
+"""What is said of the module where the program is compensated."""
+
 
 def _write(given: PostInput) -> dict[str, bytes]:
-    folders = {"stream": stream.stream_files(given), "trivkins": trivkins.trivkins_files(given)}
-    folders["player"] = player.player_files(given)
-    program, note = given.program, ""
+    machine, program = given.the_machine(), given.program
+    told = replace(given, program=commanded(program, machine))  # the module below computes legs by itself
+    folders = {"stream": stream.stream_files(told), "trivkins": trivkins.trivkins_files(told)}
+    folders["player"] = player.player_files(told)
+    note = NOT_COMPENSATED if program.provenance.compensation else ""
     try:
-        of_machine = given.the_machine(), program.component, program.period, given.toolpath
+        of_machine = machine, program.component, program.period, given.toolpath
         folders["kinematics"] = kinematics.kinematics_files(*of_machine)
         if given.toolpath is not None:
-            note = kinematics.nearer_than_least(given.the_machine(), program.component, given.toolpath)
+            note += kinematics.nearer_than_least(machine, program.component, given.toolpath)
     except MachineError as error:
         note = f"It is not here: {error}.\n"
     tools = {"tool.tbl": trivkins.tool_table(program)}
     folders = {folder: {**files, **tools} if "tool.tbl" in files else files for folder, files in folders.items()}
     files = {f"{folder}/{name}": content for folder, files in folders.items() for name, content in files.items()}
-    machine = given.the_machine()
     words = {
         "allowed": f"{trivkins.planner_acceleration(program, machine).max():.0f}",
         "limit": f"{1e3 * machine.legs.max_acceleration.min():.0f}",

@@ -1,0 +1,163 @@
+"""Commands: what drives are told so that the legs, under their loads, have the lengths of a program.
+
+A leg that pushes with the force F gets shorter by F/k. Told l + F/k, it has the length l. The force is that of the
+weights in the pose of the lengths l, and of a process force against the motion; it is known before the leg yields. What
+a screw or a table of pitch errors adds comes after it: `LegModel`. Commands are made where programs are posted, and
+nowhere before.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from pentapod.base.arrays import Floats
+from pentapod.base.errors import InputError, MachineError
+from pentapod.kinematics.forces import leg_force_map
+from pentapod.machine.calibration.digest import digest_of
+from pentapod.machine.dynamics.deflection import leg_pushes
+from pentapod.machine.machine import Machine
+from pentapod.numerics.blocks import blocks
+from pentapod.program.header import COMPENSATION, CUT_ROWS, PROCESS_FORCE
+from pentapod.program.program import GRAVITY, Program
+from pentapod.program.resolution import quantised
+
+ROUNDS = 12
+"""Most rounds of the fixed point from commands to lengths; each makes the error smaller by the share that a leg yields
+more where it is shorter, below one in a thousand."""
+
+SETTLED_M = 1e-14
+"""Change of a length that ends the fixed point, metres."""
+
+SMOOTH_S = 0.1
+"""Seconds in which a process force grows from nothing to all of it, and fades."""
+
+SLOW_M_S = 1e-3
+"""Speed below which a process force fades, as the tool stands or turns back."""
+
+ROWS_AT_ONCE = 1 << 15
+"""Rows that are computed together, which bounds the memory."""
+
+
+def compensation_sentence(program: Program, machine: Machine) -> str:
+    """Return what drives make good, and by how much their lengths differ from the program's; "" for nothing."""
+    if not program.provenance.compensation:
+        return ""
+    most = 1e6 * float(np.abs(springs(program, program.machine(machine), program.legs)).max())
+    force = program.process_force
+    process = "" if force is None else f" and {force.newtons:g} N against the motion on cuts"
+    return f"posts make good what the legs yield to weight{process}: drives are told up to {most:.3g} um more or less"
+
+
+def can_compensate(machine: Machine) -> bool:
+    """Return whether the machine says how far its legs yield, and the forces in them are known."""
+    return machine.stiffness.given and machine.ends_on_line
+
+
+def commanded(program: Program, machine: Machine | None) -> Program:
+    """Return a program with rows as the drives are told them; the same one where that is what the legs read.
+
+    Raises MachineError where the program is compensated and the machine says nothing of its stiffness.
+    """
+    if machine is None or program.provenance.commands:
+        return program
+    digest = commands_digest(program, machine)
+    if not digest:
+        return program
+    there = program.machine(machine)
+    legs = program.legs + springs(program, there, program.legs)
+    legs = there.commands(legs, np.array(program.component))
+    return replace(program, legs=quantised(legs), provenance=replace(program.provenance, commands=digest))
+
+
+def read_back(program: Program, machine: Machine) -> Program:
+    """Return a program with rows as the legs read, of one with commands.
+
+    Raises InputError: commands by another leg model, stiffness or weight.
+    """
+    digest, found = commands_digest(program, machine), program.provenance.commands
+    if not digest:
+        return program
+    if found not in ("", digest):  # "": a format that loses it
+        raise InputError(
+            "the rows are commands by another leg model, stiffness or weight", key="commands", value=found,
+            expected=digest, remedy="name the machine's file with which it was posted",
+        )  # fmt: skip
+    legs = readings(program, program.machine(machine), program.legs)
+    return replace(program, legs=quantised(legs), provenance=replace(program.provenance, commands=""))
+
+
+def readings(program: Program, machine: Machine, commands: Floats) -> Floats:
+    """Return the lengths of the legs (N, n_legs) where the drives of a program's machine are told `commands`."""
+    travel = machine.readings(commands, np.array(program.component))
+    legs = travel
+    for _ in range(ROUNDS if program.provenance.compensation else 0):
+        before, legs = legs, travel - springs(program, machine, legs)
+        if not np.nanmax(np.abs(legs - before), initial=0.0) > SETTLED_M:
+            break
+    return legs
+
+
+def springs(program: Program, machine: Machine, legs: Floats) -> Floats:
+    """Return how much longer legs of these lengths (N, n_legs) are without their loads, metres; 0 for no compensation.
+
+    machine: with its guides as in the program. NaN where the lengths have no pose in the program's component. Raises
+    MachineError where the machine does not say how far its legs yield.
+    """
+    longer = np.zeros_like(legs)
+    if program.provenance.compensation != GRAVITY:
+        return longer
+    if not can_compensate(machine):
+        raise MachineError(
+            "the program is compensated for what legs yield, but this machine does not say how far they do",
+            key=COMPENSATION, value=program.provenance.compensation,
+            remedy="name the machine's file with which it was planned",
+        )  # fmt: skip
+    forces = _forces(program, machine, legs)
+    for part in blocks(len(legs), ROWS_AT_ONCE):
+        own = legs[part]
+        position, direction = machine.robot.pose(own, program.component)
+        still = np.zeros_like(own)
+        push = leg_pushes(machine, position, direction, still, still)
+        if program.process_force is not None:
+            loads = leg_force_map(machine.robot, position, direction, machine.tool_length)
+            push += np.einsum("nac,nc->na", loads, forces[part])
+        lengths = np.linalg.norm(machine.robot.leg_vectors(position, direction), axis=-1)
+        longer[part] = push * machine.stiffness.yielding(lengths)
+    return longer
+
+
+def _forces(program: Program, machine: Machine, legs: Floats) -> Floats:
+    """Return the process force (N, 3) on the tip at rows of these lengths, newtons; empty where there is none.
+
+    It grows and fades within `SMOOTH_S`, so that the legs keep their limits where a cutter goes in and turns back.
+    """
+    process = program.process_force
+    if process is None:
+        return np.empty((0, 3))
+    cutting = np.zeros(len(legs), dtype=np.bool_)
+    for first, last in process.cuts:
+        cutting[first : last + 1] = True
+    position, direction = machine.robot.pose(legs, program.component)
+    velocity = np.gradient(position + machine.tool_length * direction, program.period, axis=0)
+    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    force = np.where(cutting[:, None], -process.newtons * velocity / np.hypot(speed, SLOW_M_S), 0.0)
+    rows = max(round(0.5 * SMOOTH_S / program.period), 1)
+    for _ in range(2):  # twice: a force that begins has no corner
+        force = uniform_filter1d(force, rows, axis=0, mode="nearest")
+    return force
+
+
+def commands_digest(program: Program, machine: Machine) -> str:
+    """Return 16 hexadecimal digits over all by which commands differ from readings; "" where they do not."""
+    if not program.provenance.compensation:
+        return machine.leg_model.digest
+    masses = {item.name: getattr(machine.masses, item.name) for item in dataclasses.fields(machine.masses)}
+    soft = {name: 1.0 / values for name, values in vars(machine.stiffness).items()}  # infinite ones have no text
+    told = {COMPENSATION: program.provenance.compensation, "leg_model": machine.leg_model.digest}
+    if (process := program.process_force) is not None:
+        told |= {PROCESS_FORCE: process.newtons, CUT_ROWS: process.cuts}
+    return digest_of({**masses, **soft, **told})
