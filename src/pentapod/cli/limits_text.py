@@ -17,9 +17,8 @@ MOST_LIMITS = 12
 
 def limits_text(found: Sequence[ActiveLimit]) -> str:
     """Return the table of a plan: the nearest limits with their smallest margins, the nearest first."""
-    lines = [
-        f"{'what must not happen':<46} {'margin':>8} {'room':>12} {'waypoint':>9} {'of path':>10}  waypoints where it is nearest"
-    ]
+    titles = f"{'what must not happen':<46} {'margin':>8} {'room':>12} {'waypoint':>9} {'of path':>10}"
+    lines = [f"{titles}  waypoints where it is nearest"]
     shown = [limit for k, limit in enumerate(found) if k < MOST_LIMITS or limit.share]
     for limit in shown:
         room = f"{limit.room:.3g} {limit.unit}" if limit.unit else ""
