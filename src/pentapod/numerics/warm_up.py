@@ -47,6 +47,7 @@ def warm_up(processes: int | None = None, progress: Progress = silent) -> tuple[
         folders[name.partition(":")[0].rpartition(".")[0]].append((name, arguments))
     work = sorted(folders.values(), key=len, reverse=True)  # what shares kernels in one process, the longest first
     count, done, compiled = sum(map(len, work)), 0, 0
+    progress("compile", 0.0, f"0 of {count} forms of kernels")
     with get_context("spawn").Pool(processes, initializer=_leave_interrupts) as pool:
         for found, misses in pool.imap_unordered(compile_all, work):
             done, compiled = done + found, compiled + misses

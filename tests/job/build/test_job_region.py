@@ -80,6 +80,14 @@ def test_a_part_somewhat_too_wide_is_asked_about(make_job, tmp_path, capsys):
     assert 'the part is 240 mm wide, the work volume of the machine 150 mm: is unit = "cm" in [part] right?' in said
 
 
+def test_a_part_that_is_smaller_than_its_cutter_is_asked_about(make_job, tmp_path, capsys):
+    job = make_job((UNIT, 'unit = "mm"\nscale = 0.1'), ("stepover_mm = 15", "stepover_mm = 2"))
+    assert run_cli(["toolpath", str(job)]) == 0
+    said = capsys.readouterr().out
+    assert 'the part is 6 mm wide, the cutter 10 mm: is unit = "mm" in [part] right?' in said
+    assert "wrote" not in said
+
+
 def test_an_open_surface_that_mostly_shows_its_back_is_told_of_flip(make_job):
     mostly = facets()
     mostly[30:] = mostly[30:, ::-1]

@@ -50,7 +50,7 @@ def new_machine(file: Path, like: str, as_json: bool, quiet: bool) -> int:
     if as_json:
         echo_json({"machine": str(file), "like": like})
     elif not quiet:
-        click.echo(f"{file}: the values are those of {like}; `pentapod machine check {file}` judges them")
+        click.echo(f"wrote {file}: the values are those of {like}; `pentapod machine check {file}` judges them")
     return 0
 
 
@@ -101,7 +101,7 @@ def linuxcnc(name_or_file: str, out: Path, as_json: bool, quiet: bool) -> int:
     if as_json:
         echo_json({"machine": made.name, "digest": made.digest, "files": [str(file) for file in files]})
     elif not quiet:
-        click.echo(f"{out}: kinematics module and simulation of {made.name}; see {out / 'README.md'}")
+        click.echo(f"wrote {out}: kinematics module and simulation of {made.name}; see {out / 'README.md'}")
     return 0
 
 
@@ -127,7 +127,7 @@ def structured_text_of(name_or_file: str, out: Path, as_json: bool, quiet: bool)
     if as_json:
         echo_json({"machine": made.name, "digest": made.digest, "file": str(out)})
     elif not quiet:
-        click.echo(f"{out}: function block PentapodKinematics of {made.name}")
+        click.echo(f"wrote {out}: function block PentapodKinematics of {made.name}")
     return 0
 
 
@@ -206,5 +206,5 @@ def import_hal(file: Path, out: Path, ini: Path | None, like: str, as_json: bool
     if as_json:
         echo_json({"machine": str(out), "digest": made.digest})
     elif not quiet:
-        click.echo(f"{out}; all but the geometry{' and the limits of the legs' if ini else ''} is that of {like}")
+        click.echo(f"wrote {out}; all but the geometry{' and the limits of the legs' if ini else ''} is that of {like}")
     return 0

@@ -12,14 +12,12 @@ from pentapod.cli.progress import progress_bar
 
 @click.command()
 @click.argument("job", type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--out", required=True, type=click.Path(path_type=Path), help="File to write; its suffix names the format."
-)
+@click.option("-o", "--out", type=click.Path(path_type=Path), help="File to write; its suffix names the format.")
 @click.option("--format", "format_name", help="Format, where the suffix does not name it: see above.")
 @json_option
 @quiet_option
-def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet: bool) -> int:
-    """Write the toolpath of JOB.toml, without machine, placement and time law.
+def toolpath(job: Path, out: Path | None, format_name: str | None, as_json: bool, quiet: bool) -> int:
+    """Make the toolpath of JOB.toml, without placement and time law; print its figures, and write it where -o says.
 
     Formats: apt (.apt .cls .cl .cldata), xyzab G-code of LinuxCNC's pentakins (.ngc), xyzbc G-code with G43.4 (.nc
     .tap), both also as xyzab-g93 and xyzbc-g93 with inverse time feed, sinumerik (.mpf), robodk (.robodk.csv), csv,
@@ -33,7 +31,8 @@ def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet
     from pentapod.job.schema.job import Job
     from pentapod.toolpath.formats import format_of, write_toolpath
 
-    format_of(out, format_name)  # an unknown format fails at once
+    if out is not None:
+        format_of(out, format_name)  # an unknown format fails at once
     loaded = Job.load(job)
     with progress_bar(quiet=quiet or as_json) as progress:
         progress("mesh", 0.0)
@@ -48,16 +47,18 @@ def toolpath(job: Path, out: Path, format_name: str | None, as_json: bool, quiet
         progress("toolpath", 0.0)
         path, report = job_toolpath(loaded, mesh, progress, machine=machine)
         progress("toolpath", 1.0)
-        progress("writing", 0.0, out.name)
-        write_toolpath(path, out, format_name)
+        if out is not None:
+            progress("writing", 0.0, out.name)
+            write_toolpath(path, out, format_name)
     kinds = [str(segment.kind) for segment in path.segments]
     lengths = [1e3 * float(arc_length(segment.tips)[-1]) for segment in path.segments]
     by_kind = {kind: sum(v for k, v in zip(kinds, lengths, strict=True) if k == kind) for kind in set(kinds)}
     if as_json:
         summary = {"waypoints": len(path), "segments": len(kinds), "length_mm": dict(sorted(by_kind.items()))}
-        echo_json({**summary, "file": str(out)})
+        echo_json({**summary, **({} if out is None else {"file": str(out)})})
     elif not quiet:
         click.echo(str(mesh.diagnosis))
         click.echo(str(report))
-        click.echo(f"wrote {out}")
+        if out is not None:
+            click.echo(f"wrote {out}")
     return 0

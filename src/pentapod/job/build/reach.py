@@ -55,7 +55,8 @@ def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
         return
     raise job.error(
         "part", key, f"the part is {size} wide, the work volume {width}",
-        expected=f"places to machine that are at most {from_si(apart, 'mm'):,.0f} mm from each other", remedy=remedy,
+        expected=f"places to machine within {from_si(apart, 'mm'):,.0f} mm, the most that any tool tip can move",
+        remedy=remedy,
     )  # fmt: skip
 
 

@@ -88,6 +88,10 @@ def region_report(job: Job, mesh: Mesh, machine: Machine | None = None) -> Regio
             f'the part is {size} wide, the work volume of the machine {width}: is unit = "{job.part.unit}" in [part] '
             "right?"
         )
+    wide = getattr(job.tool.si, "diameter", None)
+    if wide is not None and wide > widest and not states_unit(job.mesh_path):
+        size, cutter = (f"{from_si(value, 'mm'):.4g} mm" for value in (widest, wide))
+        problems.append(f'the part is {size} wide, the cutter {cutter}: is unit = "{job.part.unit}" in [part] right?')
     found = RegionShare.of(mesh, region)
     if found.inside <= 0.0:
         raise ToolpathError("the region holds nothing to machine", key="region", remedy=why_empty(mesh, region))

@@ -58,7 +58,7 @@ OPTIONS = RouteOptions()
 
 
 def with_cutter(specification: Specification) -> CollisionWorld:
-    """Return the obstacles of a way: on it the cutter must not touch them either, nor the fixture nor the table."""
+    """Return the obstacles of a way: on it the cutter must not touch them either."""
     world, cutting = specification.collision_world or NOTHING, specification.cutting
     if cutting is None:
         return world

@@ -60,7 +60,7 @@ def touch_off_table(points: list[TouchOff]) -> str:
     rows = "".join(_row(number, point) for number, point in enumerate(points, start=1))
     return (
         '<h3>Touch-off</h3><p class="hint">With the tool of the job at these legs, it just touches the part at these '
-        "points. mm; drive up along the tool axis.</p>"
+        "points, in mm. Stop short of a point, and come down to it along the tool axis.</p>"
         '<div class="scroll"><table class="touch-off"><thead><tr><th>point</th><th>on the mesh</th>'
         "<th>in the machine</th><th>tip of the tool</th><th>tool axis</th><th>legs</th></tr></thead>"
         f"<tbody>{rows}</tbody></table></div>"

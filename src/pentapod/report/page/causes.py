@@ -45,16 +45,18 @@ def kind_of(cause: str) -> int:
 
 def kinds_of(signals: Signals, story: Explanation | None) -> list[Kind]:
     """Return all kinds in their order, those of other limits last."""
-    period = float(signals.times[-1]) / max(len(signals.times) - 1, 1)
-    counts = np.bincount(signals.causes[:-1], minlength=len(signals.cause_names))
-    members = [kind_of(name) for name in signals.cause_names]
+    if story is None:  # a run that was read back: by the rows
+        period = float(signals.times[-1]) / max(len(signals.times) - 1, 1)
+        counts = np.bincount(signals.causes[:-1], minlength=len(signals.cause_names))
+        times = dict(zip(signals.cause_names, (period * counts).tolist(), strict=True))
+    else:
+        times = {cause.name: cause.time for cause in story.causes}
     saved = {} if story is None else {cause.name: cause.cost for cause in story.causes}
     found: list[Kind] = []
     for k, (name, colour) in enumerate(zip((*KINDS, OTHER), (*KIND_COLOURS, OTHER_COLOUR), strict=True)):
-        own = [n for n, kind in enumerate(members) if kind == k]
-        names = tuple(signals.cause_names[n] for n in own)
-        seconds = period * float(counts[own].sum())
-        found.append(Kind(name, colour, seconds, sum(saved.get(name, 0.0) for name in names), names))
+        names = tuple(cause for cause in times if kind_of(cause) == k)
+        seconds = sum(times[cause] for cause in names)
+        found.append(Kind(name, colour, seconds, sum(saved.get(cause, 0.0) for cause in names), names))
     return found
 
 

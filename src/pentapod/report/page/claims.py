@@ -99,7 +99,8 @@ def _nearest(claims: Sequence[Certificate], unjudged: Sequence[NotJudged]) -> tu
     rooms = [c for c in claims if c.value is not None and c.bound is not None and c.unit == "mm" and c.value > c.bound]
     if rooms:
         claim = min(rooms, key=lambda c: abs((c.value or 0.0) - (c.bound or 0.0)))
-        return f"{claim.claim}: {number((claim.value or 0.0) - (claim.bound or 0.0), claim.unit)} to spare", None
+        value, bound = number(claim.value, claim.unit), number(claim.bound, claim.unit)
+        return f"{claim.claim}: {value}{f', at least {bound}' if claim.bound else ' to spare'}", None
     return f"{len(claims)} {'claim' if len(claims) == 1 else 'claims'}", None
 
 

@@ -91,7 +91,9 @@ def stand_facts(run: PlannedRun) -> list[Fact]:
     upwards = int(np.argmax(np.abs(stand.up)))
     facts.append(("up", f"{'−' if stand.up[upwards] < 0.0 else '+'}{'XYZ'[upwards]} of the mesh"))
     if run.table is not None:
-        facts.append(("table", f"surface at z {words_of(1e3 * run.table)}; the part stands flat on it"))
+        facts.append(
+            ("table", f"surface at z {words_of(1e3 * run.table)}, as the job says, and the part on it")
+        )
     else:
         facts.append(("table", f"none given; the part goes down to z {words_of(1e3 * run.lowest)}"))
     if stand.is_tilted:
