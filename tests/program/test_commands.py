@@ -188,6 +188,16 @@ def test_a_job_is_compensated_by_itself_and_its_posted_rows_are_judged(soft_job,
     said = capsys.readouterr().out
     assert "the rows are what drives are told" in said
     assert "drives make good the weight" in said
+    # Both files, the program and what was posted of it, say where the tip is.
+    tips = list[np.ndarray]()
+    for each in (soft_job / "out" / "program.csv", file):
+        assert run(["fk", "--program", str(each), "--job", str(soft_job / "job.toml")]) == 0
+        rows = capsys.readouterr().out.splitlines()[1:]
+        tips.append(np.array([row.split(",") for row in rows], dtype=np.float64))
+        assert run(["simulate", str(each), "--job", str(soft_job / "job.toml"), "-q", "--within", "0.1"]) == 0
+        assert run(["monitor", str(file), "--program", str(each), "--job", str(soft_job / "job.toml")]) == 0
+        assert capsys.readouterr().out
+    assert np.abs(tips[0] - tips[1]).max() < 2e-8
     # Judged on a machine with other springs they are somebody else's.
     text = (soft_job / "soft.toml").read_text(encoding="utf-8").replace("stiffness_n_um = 20", "stiffness_n_um = 21")
     other = tmp_path / "soft.toml"

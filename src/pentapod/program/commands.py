@@ -92,16 +92,16 @@ def commanded(program: Program, machine: Machine | None) -> Program:
 
 
 def read_back(program: Program, machine: Machine) -> Program:
-    """Return a program with rows as the legs read, of one with commands.
+    """Return a program with rows as the legs read, of one with commands; any other as it is.
 
     Raises InputError: commands by another leg model, stiffness or weight.
     """
     digest, found = commands_digest(program, machine), program.provenance.commands
-    if not digest:
+    if not found:
         return program
-    if found not in ("", digest):  # "": a format that loses it
+    if found != digest:
         raise InputError(
-            "the rows are commands by another leg model, stiffness or weight", key="commands", value=found,
+            "the rows are commands of another leg model, stiffness or weight", key="commands", value=found,
             expected=digest, remedy="name the machine's file with which it was posted",
         )  # fmt: skip
     legs = readings(program, program.machine(machine), program.legs)
