@@ -251,3 +251,23 @@ def test_a_process_force_of_the_job_is_made_good_on_its_cuts(soft_job, tmp_path,
     (file,) = posted.glob("*.csv")
     assert run(["verify", str(file), "--job", str(soft_job / "process.toml"), "-q"]) == 0
     assert run(["simulate", str(file), "--job", str(soft_job / "process.toml"), "-q", "--within", "0.1"]) == 0
+
+
+@pytest.mark.slow
+def test_legs_keep_their_limits_where_what_is_made_good_moves_them_too(soft_job, tmp_path):
+    """Very soft legs and a large force: the first time law is made for the legs alone, and the drives would exceed."""
+    machine = (soft_job / "soft.toml").read_text(encoding="utf-8")
+    assert "stiffness_n_um = 20\n" in machine
+    (tmp_path / "soft.toml").write_text(machine.replace("stiffness_n_um = 20\n", "stiffness_n_um = 2\n"))
+    (tmp_path / "part.stl").write_bytes((soft_job / "part.stl").read_bytes())
+    text = (soft_job / "job.toml").read_text(encoding="utf-8")
+    assert "cut_mm_min = 3000\n" in text
+    text = text.replace("cut_mm_min = 3000\n", "cut_mm_min = 6000\ncutting_force_n = 300\n")
+    (tmp_path / "job.toml").write_text(text + '\n[output]\ncompensation = "process"\n')
+    job, out = Job.load(tmp_path / "job.toml"), tmp_path / "out"
+    assert run(["plan", str(tmp_path / "job.toml"), "-o", str(out), "-q"]) == 0
+    limits, program = job_machine(job).legs, read_csv(out / "program.csv")
+    told = commanded(program, job_machine(job)).legs
+    for order, limit in ((2, limits.max_acceleration), (3, limits.max_jerk)):
+        assert (np.abs(np.diff(told, order, axis=0)) / program.period**order <= 1.001 * limit).all()
+    assert "the legs keep below their limits" in (out / "report.html").read_text(encoding="utf-8")
