@@ -18,7 +18,7 @@ from pentapod.base.arrays import Bools, Floats
 from pentapod.base.errors import InputError, MachineError
 from pentapod.kinematics.forces import leg_force_map
 from pentapod.machine.calibration.digest import digest_of
-from pentapod.machine.dynamics.deflection import leg_pushes
+from pentapod.machine.dynamics.deflection import weight_yields
 from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
 from pentapod.program.header import COMPENSATION, CUT_ROWS, PROCESS_FORCE
@@ -144,13 +144,11 @@ def springs(program: Program, machine: Machine, legs: Floats) -> Floats:
     for part in blocks(len(legs), ROWS_AT_ONCE):
         own = legs[part]
         position, direction = machine.robot.pose(own, program.component)
-        still = np.zeros_like(own)
-        push = leg_pushes(machine, position, direction, still, still)
+        yields = weight_yields(machine, position, direction)
         if program.process_force is not None:
             loads = leg_force_map(machine.robot, position, direction, machine.tool_length)
-            push += np.einsum("nac,nc->na", loads, forces[part])
-        lengths = np.linalg.norm(machine.robot.leg_vectors(position, direction), axis=-1)
-        yields = push * machine.stiffness.yielding(lengths)
+            lengths = np.linalg.norm(machine.robot.leg_vectors(position, direction), axis=-1)
+            yields += np.einsum("nac,nc->na", loads, forces[part]) * machine.stiffness.yielding(lengths)
         longer[part] = np.where(np.isfinite(yields), yields, 0.0)
     return longer
 
