@@ -16,7 +16,7 @@ from pentapod.job.verdict import judge
 from pentapod.kinematics import Component
 from pentapod.machine import Dynamics, LegModel, Machine, Stiffness
 from pentapod.program import Program, Provenance, read_csv, write_csv
-from pentapod.program.commands import SMOOTH_S, commanded, read_back
+from pentapod.program.commands import SMOOTH_S, commanded, compensation_sentence, read_back
 from pentapod.program.joined import joined
 from pentapod.program.posts import PostInput, find_post, read_post, write_post
 from pentapod.program.program import ProcessForce
@@ -109,8 +109,41 @@ def test_a_process_force_pushes_back_against_the_motion():
     assert not more[500 + edge :].any()
     # It comes and goes without a corner: its acceleration is far below what legs may have.
     assert np.abs(np.diff(more, 2, axis=0)).max() / 1e-6 < 0.02 * machine.legs.max_acceleration.min()
+    assert np.abs(np.diff(more, 3, axis=0)).max() / 1e-9 < 0.01 * machine.legs.max_jerk.min()
     both = joined(plain, replace(cutting, legs=legs + (legs[-1] - legs[0])))
     assert both.process_force.cuts == ((100 + len(both.legs) - count, 499 + len(both.legs) - count),)
+
+
+@pytest.mark.parametrize("newtons", [50.0, 300.0, 1000.0])
+@pytest.mark.parametrize("stiffness", [20e6, 2e6])
+def test_commands_are_undone_where_the_tool_is_slow_and_yields_far(stiffness, newtons):
+    """From rest, there and back to rest: near its ends the motion is slower than what the force takes off it."""
+    machine = machine_of(stiffness=Stiffness(leg_stiffness=np.full(5, stiffness)))
+    share = 0.5 - 0.5 * np.cos(np.linspace(0.0, 2.0 * np.pi, 900))[:, None]
+    tips = machine.work.centre + 0.008 * share * [0.6, -0.7, 0.3]
+    up = np.tile([0.0, 0.0, 1.0], (len(tips), 1))
+    legs = np.round(machine.robot.leg_lengths(tips - machine.tool_length * up, up), 11)
+    source = Provenance(machine.name, machine.digest, "", "1", compensation="gravity")
+    cutting = ProcessForce(newtons, ((0, 899),))
+    program = Program(1e-3, legs, "cubic", Component(1, 1), RigidTransform.identity(), source, process_force=cutting)
+    told = commanded(program, machine)
+    assert np.abs(told.legs - legs).max() > 5e-6
+    assert np.abs(read_back(told, machine).legs - legs).max() < 2.5 * QUANTUM, "two last digits"
+    said = compensation_sentence(program, machine)
+    assert f"{newtons:g} N against the motion on cuts" in said
+    # What cannot be made good at this speed is told.
+    assert ("legs yield too far" in said) == (newtons / stiffness > 3e-6)
+
+
+def test_a_row_without_a_pose_leaves_the_others_as_they_are():
+    machine = MACHINES["springs"]
+    program = program_of(machine, force=ProcessForce(40.0, ((5, 59),)))
+    legs = program.legs.copy()
+    legs[20] = 0.1
+    made, usual = commanded(replace(program, legs=legs), machine).legs, commanded(program, machine).legs
+    assert np.array_equal(made[20], legs[20])
+    far = np.r_[0:5, 25:60]  # the speed at its neighbours is unknown, too
+    assert np.abs(made[far] - usual[far]).max() < 1e-6
 
 
 def test_another_stiffness_or_weight_cannot_undo_commands():
@@ -155,6 +188,16 @@ def test_a_job_is_compensated_by_itself_and_its_posted_rows_are_judged(soft_job,
     said = capsys.readouterr().out
     assert "the rows are what drives are told" in said
     assert "drives make good the weight" in said
+    # Both files, the program and what was posted of it, say where the tip is.
+    tips = list[np.ndarray]()
+    for each in (soft_job / "out" / "program.csv", file):
+        assert run(["fk", "--program", str(each), "--job", str(soft_job / "job.toml")]) == 0
+        rows = capsys.readouterr().out.splitlines()[1:]
+        tips.append(np.array([row.split(",") for row in rows], dtype=np.float64))
+        assert run(["simulate", str(each), "--job", str(soft_job / "job.toml"), "-q", "--within", "0.1"]) == 0
+        assert run(["monitor", str(file), "--program", str(each), "--job", str(soft_job / "job.toml")]) == 0
+        assert capsys.readouterr().out
+    assert np.abs(tips[0] - tips[1]).max() < 2e-8
     # Judged on a machine with other springs they are somebody else's.
     text = (soft_job / "soft.toml").read_text(encoding="utf-8").replace("stiffness_n_um = 20", "stiffness_n_um = 21")
     other = tmp_path / "soft.toml"
@@ -208,3 +251,23 @@ def test_a_process_force_of_the_job_is_made_good_on_its_cuts(soft_job, tmp_path,
     (file,) = posted.glob("*.csv")
     assert run(["verify", str(file), "--job", str(soft_job / "process.toml"), "-q"]) == 0
     assert run(["simulate", str(file), "--job", str(soft_job / "process.toml"), "-q", "--within", "0.1"]) == 0
+
+
+@pytest.mark.slow
+def test_legs_keep_their_limits_where_what_is_made_good_moves_them_too(soft_job, tmp_path):
+    """Very soft legs and a large force: the first time law is made for the legs alone, and the drives would exceed."""
+    machine = (soft_job / "soft.toml").read_text(encoding="utf-8")
+    assert "stiffness_n_um = 20\n" in machine
+    (tmp_path / "soft.toml").write_text(machine.replace("stiffness_n_um = 20\n", "stiffness_n_um = 2\n"))
+    (tmp_path / "part.stl").write_bytes((soft_job / "part.stl").read_bytes())
+    text = (soft_job / "job.toml").read_text(encoding="utf-8")
+    assert "cut_mm_min = 3000\n" in text
+    text = text.replace("cut_mm_min = 3000\n", "cut_mm_min = 6000\ncutting_force_n = 300\n")
+    (tmp_path / "job.toml").write_text(text + '\n[output]\ncompensation = "process"\n')
+    job, out = Job.load(tmp_path / "job.toml"), tmp_path / "out"
+    assert run(["plan", str(tmp_path / "job.toml"), "-o", str(out), "-q"]) == 0
+    limits, program = job_machine(job).legs, read_csv(out / "program.csv")
+    told = commanded(program, job_machine(job)).legs
+    for order, limit in ((2, limits.max_acceleration), (3, limits.max_jerk)):
+        assert (np.abs(np.diff(told, order, axis=0)) / program.period**order <= 1.001 * limit).all()
+    assert "the legs keep below their limits" in (out / "report.html").read_text(encoding="utf-8")

@@ -38,7 +38,8 @@ class MendOptions:
     that may be left out in all, as a multiple of the share of the region that may be left; ever: share of all cuts that
     is never exceeded. places: beginnings of the names of claims about places that may be left out. slow: claims that a
     better time law keeps; law: options of the search for it. apart: claims that a leg path nearer to the toolpath
-    keeps; closer: its share of the tolerances.
+    keeps; closer: its share of the tolerances. loaded: claims that a time law within less than the legs' limits keeps,
+    since drives are told more than the legs' own motion where they make good what these yield; gentler: its share.
     """
 
     rounds: int = 3
@@ -57,6 +58,8 @@ class MendOptions:
     slow: tuple[str, ...] = ("lowest feed", "no unasked stop")
     apart: tuple[str, ...] = ("tip deviation", "axis deviation", "toolpath covered")
     closer: float = 0.8
+    loaded: tuple[str, ...] = ("leg rates", "leg accelerations", "leg jerks")
+    gentler: float = 0.97
     law: JerkOptions = field(default_factory=lambda: JerkOptions(passes=24, rough_passes=4, min_gain=1e-5))
 
 
@@ -69,7 +72,7 @@ class Mend(Value):
 
     left_out: cuts of the job's toolpath that are not made, between pairs of waypoints. length: of these cuts, metres;
     share: of all cuts. law: whether the time law is searched for longer. closer: whether the motion
-    keeps a share of the tolerances.
+    keeps a share of the tolerances. gentler: whether the time law keeps a share of the legs' limits.
     """
 
     left_out: tuple[tuple[int, int], ...] = ()
@@ -78,11 +81,13 @@ class Mend(Value):
     why: tuple[str, ...] = ()
     law: bool = False
     closer: bool = False
+    gentler: bool = False
 
     def __str__(self) -> str:
         if not self.left_out:
             ways = ["the time law was searched for longer"] if self.law else []
             ways += ["the motion keeps nearer to the toolpath"] if self.closer else []
+            ways += ["the legs keep below their limits"] if self.gentler else []
             return f"second attempt: {' and '.join(ways)}, because the verdict would fail: {'; '.join(self.why)}"
         places = f"{len(self.left_out)} place{'s' if len(self.left_out) > 1 else ''}"
         return (
@@ -111,8 +116,11 @@ def mend_of(
     failed = [each for each in outcome.verdict.certificates if not each.passed] if refusal.stage == STAGE else []
     slow = [each for each in failed if each.claim in options.slow]
     apart = [each for each in failed if each.claim in options.apart]
+    loaded = [each for each in failed if each.claim in options.loaded]
     placed = [each for each in failed if each.claim.startswith(options.places) and each.where.row is not None]
-    if len(slow) + len(apart) + len(placed) < len(failed) or (slow and before.law) or (apart and before.closer):
+    if len(slow) + len(apart) + len(loaded) + len(placed) < len(failed):
+        return None
+    if (slow and before.law) or (apart and before.closer) or (loaded and before.gentler):
         return None
     why = [each.constraint for each in refusal.diagnosis[:3]] + [each.claim for each in failed[:3]]
     mend = replace(
@@ -120,10 +128,11 @@ def mend_of(
         why=tuple(dict.fromkeys((*before.why, *why))),
         law=before.law or bool(slow),
         closer=before.closer or bool(apart),
+        gentler=before.gentler or bool(loaded),
     )
     bad = _unplaced(current, refusal) if not failed else _waypoints(placed, outcome)
     if not bad.any():
-        return mend if slow or apart else None
+        return mend if slow or apart or loaded else None
     places, cutting = arc_length(whole.tilt_centres), cutting_intervals(whole)
     kept = cutting.copy()
     for first, last in before.left_out:

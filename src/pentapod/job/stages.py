@@ -207,6 +207,7 @@ def _mended(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Map
             left_out=mend.left_out,
             law=law,
             closer=share,
+            gentler=MENDING.gentler if mend.gentler else 1.0,
             placed=placed,
             start=start,
         )

@@ -86,8 +86,8 @@ class Task:
 
     specification: the job's requirements on plan and program. left_out: pairs of waypoints of the job's toolpath
     between which the toolpath of the specification makes no cut. law: options of the time law. closer: share of the
-    tolerances of path and axis that the leg path keeps. placed: the placed path, where it is known; start: that of
-    nearly the same toolpath, from which the placement starts.
+    tolerances of path and axis that the leg path keeps; gentler: of the legs' limits that the time law keeps. placed:
+    the placed path, where it is known; start: that of nearly the same toolpath, from which the placement starts.
     """
 
     job: Job
@@ -100,6 +100,7 @@ class Task:
     left_out: tuple[tuple[int, int], ...] = ()
     law: JerkOptions = DEFAULTS
     closer: float = 1.0
+    gentler: float = 1.0
     placed: PlacedPath | None = None
     start: PlacedPath | None = None
 
@@ -168,7 +169,10 @@ class Task:
         return refusal_of(met) if met else placed
 
     def _timed(self, path: LegPath) -> Trajectory | Refusal:
-        machine, progress = self.machine, self.runner.progress
+        legs, progress = self.machine.legs, self.runner.progress
+        names = ("max_velocity", "max_acceleration", "max_jerk")
+        legs = dataclasses.replace(legs, **{name: self.gentler * getattr(legs, name) for name in names})
+        machine = dataclasses.replace(self.machine, legs=legs)
         if self.before is not None:
             return retime_as_before(path, machine, self.before.laws, limits=self.limits, progress=progress)
         return retime(path, machine, limits=self.limits, progress=progress, jerk_options=self.law)

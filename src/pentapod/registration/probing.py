@@ -58,10 +58,11 @@ OPTIONS = ProbingOptions()
 
 @dataclass(frozen=True, eq=False)
 class Probing(Result):
-    """Touches in the order in which they are made. points, normals (N, 3): workpiece frame; legs (N, n): at the touch.
+    """Touches in the order in which they are made. points, normals (N, 3): workpiece frame.
 
-    ways: for each touch the legs (K, n) on the way to its approach, from the one before; beyond (N, n): where the way
-    to the surface ends; length (N,): metres of that way. head: of the list of touches, without any.
+    legs (N, n): as the drives count them at the touch. ways: for each touch the legs (K, n) on the way to its approach,
+    from the one before; beyond (N, n): where the way to the surface ends; length (N,): metres of that way. head: of the
+    list of touches, without any.
     """
 
     points: Floats

@@ -30,6 +30,7 @@ from pentapod.base.units import from_si, to_si
 from pentapod.base.values import Value
 from pentapod.kinematics.component import Component
 from pentapod.kinematics.robot import Branch
+from pentapod.machine.dynamics.deflection import loaded_poses
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.margins import Margins
 
@@ -77,8 +78,10 @@ class Touches(Value):
     def __post_init__(self) -> None:
         set_frozen(self, legs=frozen(self.legs, "legs", (None, None)))
 
-    def centres(self, machine: Machine, file: str | Path | None = None) -> Floats:
+    def centres(self, machine: Machine, file: str | Path | None = None, *, loaded: bool = False) -> Floats:
         """Return the centres (N, 3) of the ball at the trip, machine frame, metres. file: named in errors.
+
+        loaded: whether legs, by the machine's weight, are shorter than their drives count.
 
         Without a component it is the one in which all touches keep the machine's limits. Raises InputError: legs beyond
         their strokes, without a pose, or with poses in several components.
@@ -102,6 +105,8 @@ class Touches(Value):
                 )  # fmt: skip
             branches = (fitting[0],)
         position, direction = poses[branches[0]]
+        if loaded:
+            position, direction = loaded_poses(own, self.legs, branches[0])
         lost = np.flatnonzero(~np.isfinite(position).all(axis=1))
         if len(lost):
             row = int(lost[0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +16,13 @@ from pentapod.geometry.solids import Cone
 from pentapod.job.artefacts import ARRAYS
 from pentapod.job.build.placement import job_at
 from pentapod.job.build.specification import job_fixture
-from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.job.build.values import job_compensation, job_machine, job_mesh
 from pentapod.job.clamped.registration import cut_surface, planned_placement
 from pentapod.job.plan_arrays import GUIDES, JOB_FILE
 from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import Component
 from pentapod.machine.clearance.collision_world import CollisionWorld
+from pentapod.machine.dynamics.deflection import weight_yields
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.registration.probing import OPTIONS, Probing, plan_probing
 from pentapod.registration.touches import Touches
@@ -71,4 +72,8 @@ def probing_of(folder: str | Path, probe: Probe, count: int, misplaced: float = 
         empty, machine.tool_length, probe.tip_radius, (), component, machine.name, pose.position_mm, pose.rotation_deg
     )
     surface, cut = MeshDistance.of(mesh), cut_surface(job, mesh)
-    return plan_probing(machine, component, surface, placement, cut, world, head, count, misplaced)
+    found = plan_probing(machine, component, surface, placement, cut, world, head, count, misplaced)
+    if isinstance(found, Refusal) or not job_compensation(job, machine):
+        return found
+    poses = machine.robot.pose(found.legs, np.array(component))
+    return replace(found, legs=found.legs + weight_yields(machine, *poses))

@@ -9,8 +9,12 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
 from pentapod.kinematics.forces import leg_force_map
+from pentapod.kinematics.robot import Branch
 from pentapod.machine.dynamics.dynamics import Dynamics
 from pentapod.machine.machine import Machine
+
+ROUNDS = 4
+"""Rounds of the fixed point from what drives count to the pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +52,28 @@ def tip_shift(machine: Machine, position: Floats, direction: Floats, shorter: Fl
     loads = leg_force_map(machine.robot, position, direction, machine.tool_length)
     # Virtual work: shift = -loads^T (change of length).
     return np.einsum("nac,na->nc", loads, shorter)
+
+
+def weight_yields(machine: Machine, position: Floats, direction: Floats) -> Floats:
+    """Return how much shorter legs get by the weight (N, n_legs) in poses (N, 3) at rest, metres; less than 0: longer.
+
+    Not finite where there is no pose, or on a singularity.
+    """
+    lengths = np.linalg.norm(machine.robot.leg_vectors(position, direction), axis=-1)
+    still = np.zeros_like(lengths)
+    return leg_pushes(machine, position, direction, still, still) * machine.stiffness.yielding(lengths)
+
+
+def loaded_poses(machine: Machine, counted: Floats, branch: Branch) -> tuple[Floats, Floats]:
+    """Return the poses (N, 3) of a machine at rest whose drives count `counted` (N, n_legs): its weight is on its legs.
+
+    NaN where there is none. What a leg yields changes by less than a thousandth of its length's change: a few rounds.
+    """
+    position, direction = machine.robot.pose(counted, np.array(branch))
+    for _ in range(ROUNDS):
+        legs = counted - weight_yields(machine, position, direction)
+        position, direction = machine.robot.pose(legs, np.array(branch))
+    return position, direction
 
 
 def leg_pushes(machine: Machine, position: Floats, direction: Floats, rates: Floats, accelerations: Floats) -> Floats:

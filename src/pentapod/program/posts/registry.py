@@ -11,7 +11,7 @@ from pentapod.base.errors import InputError
 from pentapod.base.registry import Registry
 from pentapod.base.values import Value
 from pentapod.machine.machine import Machine
-from pentapod.program.commands import commanded, read_back
+from pentapod.program.commands import commanded, commands_digest, read_back
 from pentapod.program.csv import csv_bytes
 from pentapod.program.posts.files import write_files
 from pentapod.program.posts.verified import VerdictContent, check_passed, marked_unverified
@@ -143,4 +143,9 @@ def read_post(folder: str | Path, name: str, machine: Machine | None = None) -> 
     """
     post = find_post(name)
     found = post.read(Path(folder))
-    return found if machine is None or post.readings or not isinstance(found, Program) else read_back(found, machine)
+    if machine is None or post.readings or not isinstance(found, Program):
+        return found
+    if not found.provenance.commands:  # a format that loses it: a post writes commands
+        source = replace(found.provenance, commands=commands_digest(found, machine))
+        found = replace(found, provenance=source)
+    return read_back(found, machine)
