@@ -73,7 +73,7 @@ def test_held_runs_are_said_to_be_held(folder, tmp_path, capsys):
     assert run(["monitor", log, "--program", str(folder), "--tolerance-mm", "0.001"]) == 0
     said = capsys.readouterr().out
     assert re.search(r"held or overridden: pace 0\.00 to 1\.\d\d, median 0\.\d\d", said)
-    assert re.search(r"hold at 1\.\d+ s \([01]\.\d+ s\): 0\.\d+ s", said)
+    assert re.search(r"hold at 1\.\d+ s of the log, [01]\.\d+ s of the program, for 0\.\d+ s", said)
     assert "in time:" not in said
 
 

@@ -34,6 +34,7 @@ def planned(tmp_path_factory):
     (folder / "part.stl").write_bytes(dome_stl(cells=12))
     (folder / "desk.toml").write_text(LIBRARY.joinpath("desk.toml").read_text(encoding="utf-8"), encoding="utf-8")
     text = job_text().replace("diameter_mm = 10", "diameter_mm = 10\nflute_mm = 20")
+    text = text.replace('unit = "mm"', 'unit = "mm"\nstock_mm = [70, 65, 20]')
     (folder / "job.toml").write_text(text.replace('name = "desk"', 'file = "desk.toml"'))
     outcome = run(Job.load(folder / "job.toml"), folder / "out", writers={"sheet.html": write_sheet})
     return folder, outcome
@@ -53,6 +54,21 @@ def copied(planned, tmp_path):
 def told(text: str) -> str:
     """The text of a page, with its minus signs plain."""
     return " ".join(unescape(re.sub(r"<[^>]+>", " ", text)).replace("−", "-").split())
+
+
+def test_sheet_tells_the_stock_and_which_side_is_up(sheet):
+    page = told(sheet)
+    assert "stock 70.0 × 65.0 × 20.0 along X, Y, Z" in page, page[page.index("part.stl") - 20 :][:300]
+    assert "up +Z of the mesh" in page
+
+
+def test_a_stock_that_is_smaller_than_the_part_is_refused(planned, copied, capsys):
+    job = Job.load(planned[0] / "job.toml")
+    assert job.digest == job.with_(**{"part.stock_mm": None}).digest, "the program does not depend on it"
+    file = copied / "job.toml"
+    file.write_text(file.read_text(encoding="utf-8").replace("[70, 65, 20]", "[70, 55, 20]"), encoding="utf-8")
+    assert command(["plan", str(file), "-o", str(copied / "again")]) == 2
+    assert "part.stock_mm: the stock is smaller than the part" in capsys.readouterr().err
 
 
 def test_sheet_needs_no_script_and_no_request(sheet):

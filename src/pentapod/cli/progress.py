@@ -63,13 +63,14 @@ class Lines:
 
     def __init__(self, echo: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
         self.echo, self.clock = echo, clock
-        self.stage, self.told, self.left = "", clock(), TimeLeft(clock())
+        self.stage, self.told, self.seen, self.left = "", clock(), clock(), TimeLeft(clock())
 
     def __call__(self, stage: str, fraction: float, note: str = "") -> None:
         """Print a line if it is time."""
         now = self.clock()
         if stage != self.stage:
-            self.stage, self.left = stage, TimeLeft(now)
+            self.stage, self.left = stage, TimeLeft(self.seen)  # many stages report first when a part of them is done
+        self.seen = now
         if now - self.told < LINE_EVERY_S:
             return
         self.told, share = now, f" {100.0 * fraction:.0f} %" if fraction > 0.0 else ""

@@ -6,6 +6,8 @@ import dataclasses
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from pentapod.base.refusal import Refusal
 from pentapod.base.units import from_si
 from pentapod.base.version import __version__, library_versions, processor_kind
@@ -41,6 +43,9 @@ UPRIGHT = "the tool does not lean, because it would touch the part"
 STRAIGHT = "the tool keeps one direction, because it would touch the part"
 """What is said of a placement with one axis everywhere."""
 
+LEANS_DEG = 0.05
+"""Lean of a part from which it is told that it needs a wedge."""
+
 FAR_OUTSIDE = 0.5
 """Distance of a path from the work volume, by the volume's diameter, beyond which it is told."""
 
@@ -59,10 +64,11 @@ def explanation(
     return explain(trajectory, machine, uses, slow)
 
 
-def placement_remarks(placed: PlacedPath | Refusal, work: WorkVolume) -> str:
+def placement_remarks(placed: PlacedPath | Refusal, work: WorkVolume, *, free: bool) -> str:
     """Return the positions of guides, a common direction of the tool, and what the choice of placement has to tell.
 
-    A path far outside the work volume is no error where it keeps all limits; but a height may be mistyped.
+    A path far outside the work volume is no error where it keeps all limits; but a height may be mistyped. free:
+    whether the part may lean as it likes; then it is told that it does.
     """
     if isinstance(placed, Refusal):
         return ""
@@ -71,6 +77,11 @@ def placement_remarks(placed: PlacedPath | Refusal, work: WorkVolume) -> str:
     lines += [f"tool axis: {placed.common_axis}; {placed.lean}"] if placed.common_axis is not None else []
     if any(word in chosen.chosen_by for word in (INTERRUPTED, UPRIGHT, STRAIGHT)):
         lines.append(f"placement: {chosen.chosen_by}; smallest margin {placed.smallest_margin:.3f}")
+    lean = from_si(float(np.arccos(min(float(np.abs(chosen.transform.rotation[2]).max()), 1.0))), "deg")
+    if free and lean > LEANS_DEG:
+        lines.append(
+            f'  note: the part leans by {lean:.1f} deg, on a wedge: [placement] mode = "table" keeps it flat on a table'
+        )
     outside = work.outside(placed.tips)
     if outside > FAR_OUTSIDE * work.diameter:
         far = f"{from_si(outside, 'mm'):.0f} mm"
@@ -118,7 +129,7 @@ class Task:
         """Plan, write the program to `file` and return it; or return the first refusal."""
         placed = self.placed
         if placed is None:
-            told = partial(placement_remarks, work=self.machine.work)
+            told = partial(placement_remarks, work=self.machine.work, free=self.job.placement.mode == "free")
             placed = self.runner.run("placement", self._placed, remark=told)
         if isinstance(placed, Refusal):
             return placed

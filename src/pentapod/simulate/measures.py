@@ -105,7 +105,8 @@ class Tracking(Value):
         """Return the measures as text, a line for each."""
         lines = measured_lines(self.measures, self.reference.program.times, self.cutting)
         bounded = [measure.name for measure in self.measures].index(TO_TOOLPATH)
-        lines[bounded] += f" (tolerance of the job: {1e3 * self.tolerance:g} mm)"
+        beyond = self.measures[bounded].largest > 1e3 * self.tolerance
+        lines[bounded] += f" ({'beyond' if beyond else 'within'} the tolerance of the job: {1e3 * self.tolerance:g} mm)"
         return lines
 
     @cached_property
@@ -136,12 +137,17 @@ def measured_dict(measures: Sequence[Measure], times: Floats, cutting: Bools) ->
     }
 
 
+def _figure(value: float) -> str:
+    """Return a number in two digits, and all its digits before the point."""
+    return f"{value:.2g}" if value < 100.0 else f"{value:.0f}"
+
+
 def measured_lines(measures: Sequence[Measure], times: Floats, cutting: Bools) -> list[str]:
     """Return measures as text, a line for each; see `measured_dict`."""
     lines: list[str] = []
     for measure in measures:
         line = f"  {measure.name + ':':<20} largest {measure.largest:.3g} {measure.unit}"
-        line += f" at {times[measure.row]:.3f} s, rms {measure.rms:.2g} {measure.unit}"
+        line += f" at {times[measure.row]:.3f} s, rms {_figure(measure.rms)} {measure.unit}"
         if cutting.any():
             line += f"; on cuts at most {measure.values[cutting].max():.3g} {measure.unit}"
         lines.append(line)

@@ -42,8 +42,8 @@ class PathReport(Value):
         stepover = f", up to {1e3 * self.stepover:.4g} mm apart" if self.stepover else ""
         text = (
             f"{self.strategy}: {self.passes:,} passes{stepover}, {self.cut_length:.4g} m along the surface; "
-            f"{self.stay_downs:,} links on the surface, {self.hops:,} hops, {self.retracts:,} rapids at the clearance "
-            "height"
+            f"passes reached: {self.stay_downs:,} on the surface, {self.hops:,} by hops, {self.retracts:,} at the "
+            "clearance height"
         )
         for note in self.notes:
             text += f"\n  note: {note}"

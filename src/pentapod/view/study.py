@@ -17,7 +17,7 @@ from pentapod.planning.placement.sampling import best_tilted_margins
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.view.opened_run import OpenedRun
 
-COMFORTABLE = 0.4
+COMFORTABLE = 0.5
 """Smallest margin from which a waypoint has the best colour."""
 
 

@@ -196,6 +196,11 @@ def test_auto_axes_that_tool_or_file_do_not_allow(make_job, changes, pieces):
     assert all(piece in str(caught.value) for piece in pieces), str(caught.value)
 
 
+def test_a_mesh_in_place_of_a_job_is_told_what_to_do(tmp_path):
+    with pytest.raises(JobError, match=r"part\.STL: this is a mesh, not a job.*`pentapod new part\.STL` writes a job"):
+        Job.load(tmp_path / "part.STL")
+
+
 def test_every_key_is_described_and_has_its_unit():
     unitless = {
         "mesh", "unit", "scale", "repair", "flip", "region_direction", "name", "file", "type", "strategy", "pattern",

@@ -29,6 +29,9 @@ LARGEST_TOLERANCE = 0.1
 PROCESS = "process"
 """Asks for compensation of gravity and of the cutting force."""
 
+SLACK = 1e-6
+"""Metres by which the stock may be smaller than the part, for rounding."""
+
 
 def job_machine(job: Job, machine: Machine | None = None) -> Machine:
     """Return the machine with the job's tool length, controller settings, tool limits and cutting force.
@@ -97,7 +100,11 @@ def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
 
 def _check_sizes(job: Job, mesh: Mesh) -> None:
     """Raise JobError for a tolerance or another length that is too large for the part."""
-    extent = float(np.ptp(mesh.bounds, axis=0).max())
+    size = np.ptp(mesh.bounds, axis=0)
+    if job.part.si.stock is not None and (np.asarray(job.part.si.stock) < size - SLACK).any():
+        least = " x ".join(f"{from_si(extent, 'mm'):.4g}" for extent in size)
+        raise job.error("part", "stock_mm", "the stock is smaller than the part", expected=f"at least {least} mm")
+    extent = float(size.max())
     largest = f"the part, whose largest extent is {from_si(extent, 'mm'):.4g} mm"
     remedy = "check part.unit and part.scale"
     for key, value in (("chordal_mm", job.tolerance.si.chordal), ("path_mm", job.tolerance.si.path)):

@@ -22,6 +22,7 @@ from pentapod.base.values import Value
 from pentapod.cutters.registry import CUTTERS
 from pentapod.job.schema.strategies import file_keys, job_strategies, strategy_table
 from pentapod.job.schema.tables import JobTables, table_model
+from pentapod.mesh.io.registry import MESH_FORMATS
 
 _VARIABLE = re.compile(r"\$\{(\w+)\}")
 Content = Mapping[str, Any]
@@ -81,6 +82,9 @@ class Job(Value):
     def load(cls, path: str | Path) -> Job:
         """Return the job of a TOML file. Raises JobError: one line with file, key, value and remedy."""
         path = Path(path)
+        if path.suffix.lower().removeprefix(".") in MESH_FORMATS:
+            remedy = f"`pentapod new {path.name}` writes a job for it"
+            raise JobError("this is a mesh, not a job", file=path, expected="a job file in TOML", remedy=remedy)
         text = read_toml(path, "job", JobError, start='"pentapod new DIR" writes one to start from')
         return cls._of(parsed(text, path, JobError), path, text)
 
@@ -156,8 +160,8 @@ class Job(Value):
     def digest(self) -> str:
         """16 hexadecimal digits over the meaning of the job: defaults filled in, files by their bytes.
 
-        Comments, order of keys and folders of files do not change it; nor does [verify], which does not affect the
-        program.
+        Comments, order of keys and folders of files do not change it; nor do [verify] and the stock, which do not
+        affect the program.
         """
         if self.asked is not None:
             return self.asked.digest
@@ -174,6 +178,7 @@ class Job(Value):
             del content["process"]
         if self.placement.table_turn_deg is None:
             del content["placement"]["table_turn_deg"]
+        del content["part"]["stock_mm"]
         if not self.part.flip:
             del content["part"]["flip"]
         content["part"]["mesh"] = [self.mesh_path.suffix.lower(), _sha(self.mesh_path)]

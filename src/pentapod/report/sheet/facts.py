@@ -83,17 +83,18 @@ def stand_facts(run: PlannedRun) -> list[Fact]:
         share = RegionShare.of(run.mesh, job_region(job)).inside
         box = "" if job.part.region_box_mm is None else f", in the box {_box(job.part.region_box_mm)}"
         facts.append(("machined", f"{100.0 * share:.3g} % of the surface{box}"))
+    if (stock := job.part.si.stock) is not None:
+        size = " × ".join(_mm(value, 1) for value in stock)
+        facts.append(("stock", f"{size} along X, Y, Z; nothing is judged by it"))
     x, y, z = (words_of(value) for value in 1e3 * run.placement.translation)
-    facts.append(("at", f"x {x}, y {y}, z {z}"))
+    facts.append(("origin at", f"x {x}, y {y}, z {z}"))
     facts.append(
         ("turn", f"{stand.turned.upper()} points to {words_of(np.degrees(stand.turn), 2)}° (0° is x, 90° is y)")
     )
     upwards = int(np.argmax(np.abs(stand.up)))
     facts.append(("up", f"{'−' if stand.up[upwards] < 0.0 else '+'}{'XYZ'[upwards]} of the mesh"))
     if run.table is not None:
-        facts.append(
-            ("table", f"surface at z {words_of(1e3 * run.table)}, as the job says, and the part on it")
-        )
+        facts.append(("table", f"surface at z {words_of(1e3 * run.table)}, as the job says, and the part on it"))
     else:
         facts.append(("table", f"none given; the part goes down to z {words_of(1e3 * run.lowest)}"))
     if stand.is_tilted:
@@ -151,7 +152,7 @@ def checks(run: PlannedRun, digest: str) -> list[str]:
     if run.program is not None and run.program.rail_positions is not None:
         done.append("Guides at the positions above, and locked.")
     done.append("Tool, stick-out and stem as above; spindle on at the speed for this tool.")
-    done.append("Part: size and raw side as above, clean seat.")
+    done.append("Part, or stock: size and raw side as above, clean seat.")
     if run.stand.is_tilted and run.table is None:
         done.append(f"Wedge of {words_of(np.degrees(run.stand.lean))}° under the part, low side as drawn.")
     judged = "Fixture as drawn." if run.held else "The job names no fixture: nothing has judged the clamps."

@@ -89,7 +89,7 @@ class LegErrors(Value):
         heads = "".join(f"{f'leg {k + 1}':>10}" for k in range(len(self.offset)))
         text = [f"  {'errors of the legs':<28}{heads}"]
         for name, values in rows:
-            cells = "".join(f"{'-' if np.isnan(value) else f'{value:.3g}':>10}" for value in values)
+            cells = "".join(f"{'-' if np.isnan(value) else f'{round(value, 4) + 0.0:.3g}':>10}" for value in values)
             text.append(f"  {name:<28}{cells}")
         return text
 

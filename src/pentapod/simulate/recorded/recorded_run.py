@@ -139,7 +139,10 @@ class RecordedRun(Value):
             low, most = float(pace.min()), float(pace.max())
             lines.append(f"  held or overridden: pace {low:.2f} to {most:.2f}, median {np.median(pace):.2f}")
             lines.append("  errors are across the path; not compared in time")
-        lines += [f"  hold at {h.time:.3f} s ({h.program_time:.3f} s): {h.duration:.3f} s" for h in self.holds]
+        lines += [
+            f"  hold at {h.time:.3f} s of the log, {h.program_time:.3f} s of the program, for {h.duration:.3f} s"
+            for h in self.holds
+        ]
         lines += measured_lines(self.measures, self.times, self.cutting)
         lines += self.errors.lines()
         for name, forces in (("forces expected", self.expected), ("forces measured", self.measured)):
