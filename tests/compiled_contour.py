@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import dataclasses
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,8 +12,10 @@ import numpy as np
 
 from compiled_kinematics import COMPILER, STRICT
 from pentapod.kinematics.component import COMPONENTS
-from pentapod.machine import Machine
+from pentapod.machine import Drives, Machine
 from pentapod.program.posts.linuxcnc.kinematics import kinematics_files
+from pentapod.simulate import Reference, contour_errors
+from short_motion import motion
 
 CALLS = """
 #include "pentapod_contour.h"
@@ -82,6 +85,11 @@ void loops(long n, const double *command, const int *enable, const double *pushe
     }
 }
 """
+MM = 1e3
+LAGS = 1.0 / np.array([80.0, 70.0, 80.0, 90.0, 75.0])
+REST = 300
+CHANGE_MM = 0.1 * 5000e-6
+"""Largest change of a correction's rate in a period: a tenth of the legs' acceleration."""
 
 
 @dataclass(frozen=True)
@@ -139,3 +147,30 @@ class Contour:
 
 def _at(array: np.ndarray) -> ctypes.c_void_p:
     return array.ctypes.data_as(ctypes.c_void_p)
+
+
+def lagging(machine: Machine) -> Machine:
+    """Drives that do little but lag, each as long as LAGS says."""
+    drives = Drives(
+        position_gain=1.0 / LAGS, velocity_gain=2000.0, velocity_integral=0.0, velocity_feedforward=0.0,
+        acceleration_feedforward=0.0, dead_time=0.0, ripple_force=0.0, encoder_step=0.0,
+    )  # fmt: skip
+    return dataclasses.replace(machine, drives=drives)
+
+
+def commanded(duration: float) -> np.ndarray:
+    """The short motion's legs, mm, with rest before and after."""
+    legs = MM * motion(duration)[0].legs
+    return np.concatenate([np.repeat(legs[:1], REST, axis=0), legs, np.repeat(legs[-1:], REST, axis=0)])
+
+
+def accelerations(legs: np.ndarray) -> np.ndarray:
+    """Sizes of the second differences, mm in a period squared."""
+    return np.abs(np.diff(legs, 2, axis=0))
+
+
+def contour_um(machine: Machine, reference: Reference, legs: np.ndarray) -> np.ndarray:
+    """Contour errors (N,) of legs (N, 5), metres, at the program's rows."""
+    p, i = machine.robot.pose(legs, COMPONENTS[0])
+    tips, rows = p + machine.tool_length * i, 2 * np.arange(len(legs))
+    return 1e6 * contour_errors(tips, i, reference.tips, reference.directions, rows, 60)[0]

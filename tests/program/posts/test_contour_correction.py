@@ -8,45 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compiled_contour import Contour, Run
+from compiled_contour import CHANGE_MM, LAGS, MM, REST, Contour, Run, accelerations, commanded, contour_um, lagging
 from compiled_kinematics import calibrated, compiled, poses
 from pentapod.kinematics.component import COMPONENTS
-from pentapod.machine import Drives, Machine
+from pentapod.machine import Machine
 from pentapod.program.posts import PostInput
 from pentapod.program.posts.linuxcnc.contour import calm_correction, contour_values
 from pentapod.program.posts.linuxcnc.kinematics import controller_frame, kinematics_files
 from pentapod.program.posts.linuxcnc.module import Module
 from pentapod.program.posts.linuxcnc.player import player_files
-from pentapod.simulate import Reference, contour_errors, simulate_servo
+from pentapod.simulate import Reference, simulate_servo
 from pentapod.simulate.servo import _forward
 from pentapod.simulate.servo_kernels import contour, correct
 from short_motion import motion
 
 pytestmark = compiled
-MM = 1e3
-LAGS = 1.0 / np.array([80.0, 70.0, 80.0, 90.0, 75.0])
-REST = 300
-CHANGE_MM = 0.1 * 5000e-6
-"""Largest change of a correction's rate in a period: a tenth of the legs' acceleration."""
-
-
-def lagging(machine: Machine) -> Machine:
-    """Drives that do little but lag, each as long as LAGS says."""
-    drives = Drives(
-        position_gain=1.0 / LAGS, velocity_gain=2000.0, velocity_integral=0.0, velocity_feedforward=0.0,
-        acceleration_feedforward=0.0, dead_time=0.0, ripple_force=0.0, encoder_step=0.0,
-    )  # fmt: skip
-    return dataclasses.replace(machine, drives=drives)
-
-
-def commanded(duration: float) -> np.ndarray:
-    """The short motion's legs, mm, with rest before and after."""
-    legs = MM * motion(duration)[0].legs
-    return np.concatenate([np.repeat(legs[:1], REST, axis=0), legs, np.repeat(legs[-1:], REST, axis=0)])
-
-
-def accelerations(legs: np.ndarray) -> np.ndarray:
-    return np.abs(np.diff(legs, 2, axis=0))
 
 
 def window_of(machine: Machine) -> int:
@@ -106,7 +82,7 @@ def test_errors_lead_to_the_nearest_pose_of_the_path(name, tmp_path):
         name, lambda: calibrated(4, 0.012)
     )()
     count, window = 60, window_of(machine)
-    points, directions = ways(machine, count, window + 2, 5, bend=0.1)
+    points, directions = ways(machine, count, window + 2, 5, bend=0.01)
     rng = np.random.default_rng(6)
     paths = machine.robot.leg_lengths(points[:, ::2].reshape(-1, 3), directions[:, ::2].reshape(-1, 3))
     legs = paths.reshape(count, -1, 5)[:, window] + rng.uniform(-5e-5, 5e-5, (count, 5))
@@ -125,12 +101,6 @@ def test_errors_lead_to_the_nearest_pose_of_the_path(name, tmp_path):
         expected = machine.robot.leg_lengths(on[0][best][None], on[1][best][None])[0] - legs[k]
         assert np.abs(MM * expected - found[k, :5]).max() < 2e-4
         assert MM * np.sqrt(away[best]) == pytest.approx(found[k, 5], abs=2e-4)
-
-
-def contour_um(machine: Machine, reference: Reference, legs: np.ndarray) -> np.ndarray:
-    p, i = machine.robot.pose(legs, COMPONENTS[0])
-    tips, rows = p + machine.tool_length * i, 2 * np.arange(len(legs))
-    return 1e6 * contour_errors(tips, i, reference.tips, reference.directions, rows, 60)[0]
 
 
 def test_correction_is_worth_what_the_simulation_predicts(tmp_path):
@@ -254,7 +224,7 @@ def test_drives_without_a_stable_correction_have_none(tmp_path):
 def test_correction_is_off_in_all_that_is_written(tmp_path):
     program, machine = motion(0.2)
     files = kinematics_files(machine, COMPONENTS[0], 1e-3)
-    assert b"[CONTOUR]\nENABLE = 0\nBOUND_UM = 50\n" in files["pentapod.ini"]
+    assert b"[CONTOUR]\nENABLE = 0\nBOUND_UM = 50\nACCELERATION_SHARE = 0.3\n" in files["pentapod.ini"]
     played = player_files(PostInput(program, machine))
     assert played["pentapod_contour.h"] == files["pentapod_contour.h"]
     assert b"enable" not in b"".join(line for line in played["player.hal"].splitlines() if b"contour" in line)

@@ -26,13 +26,15 @@ class ContourOptions:
     """What the pins of the correction hold from the start.
 
     bound_um: largest correction of a leg. range_um: way off the path beyond which nothing is corrected. share: of the
-    legs' accelerations, with which the correction may change. late: servo periods that the path is looked back beyond
+    legs' accelerations, with which the correction may change; planner_share: of them, where LinuxCNC plans, whose axes
+    leave most of it. late: servo periods that the path is looked back beyond
     the lag of the drives.
     """
 
     bound_um: float = 50.0
     range_um: float = 1000.0
     share: float = 0.1
+    planner_share: float = 0.3
     late: int = 3
 
 
@@ -92,13 +94,15 @@ def joint_lines(legs: int) -> list[str]:
         *(f"net leg{k + 1} joint.{k}.motor-pos-cmd => pentapod-contour.motor.{k}" for k in range(legs)),
         *(f"net drive{k + 1} pentapod-contour.out.{k} => joint.{k}.motor-pos-fb" for k in range(legs)),
         "setp pentapod-contour.bound-um [CONTOUR]BOUND_UM",
+        "setp pentapod-contour.acceleration-share [CONTOUR]ACCELERATION_SHARE",
         "setp pentapod-contour.enable [CONTOUR]ENABLE",
     ]
 
 
 def ini_table() -> str:
     """Return the ini's table of the correction: off."""
-    return f"[CONTOUR]\nENABLE = 0\nBOUND_UM = {OPTIONS.bound_um:g}\n"
+    share = f"ACCELERATION_SHARE = {OPTIONS.planner_share:g}"
+    return f"[CONTOUR]\nENABLE = 0\nBOUND_UM = {OPTIONS.bound_um:g}\n{share}\n"
 
 
 def player_lines(legs: int) -> list[str]:
