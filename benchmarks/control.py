@@ -1,4 +1,4 @@
-"""The kinematics module for LinuxCNC: asked and reached. Microseconds of CPU, differences, cold starts.
+"""The kinematics module and contour correction for LinuxCNC: asked and reached. Microseconds, differences, cold starts.
 
 Compiled as halcompile does (-Os). Jogs in LinuxCNC itself: PENTAPOD_JOG_POSES=200 pytest
 tests/program/posts/test_linuxcnc_by_hand.py -m slow, 40 s a pose.
@@ -18,10 +18,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+
+from compiled_contour import LAGS, REST, Contour, commanded, contour_um, lagging
 from compiled_kinematics import Compiled, calibrated, poses, world_of
 from linuxcnc_kinematics import MODULE, asked
 from pentapod.kinematics import AsBuiltPentapod
 from pentapod.machine import Machine
+from pentapod.simulate import Reference, simulate_servo
+from short_motion import motion
 
 LEAST = np.array([0.1, 20.0, 0.0, 0.0, 0.0, 1.0, 1.0])
 FAST = np.array([1000.0, 1000.0, 1000.0, 289.4, 289.4])
@@ -58,6 +62,27 @@ def speeds(name: str, machine: Machine, module: Compiled, count: int) -> None:
     moving, _ = module.inverses(here)
     guard = microseconds(lambda: module.guards(moving, False, LEAST, FAST), count)
     row(f"{name}: guard, µs", "3", f"{guard:.3f}")
+
+
+def correction(name: str, machine: Machine, folder: Path, count: int) -> None:
+    """Time the contour correction; and what it leaves of the error of drives that lag, against the simulation."""
+    commands = np.repeat(commanded(6.0), count // 6600 + 1, axis=0)[:count]
+    module = Contour(machine, folder, ("-Os",))
+    spent = microseconds(lambda: module.run(commands, LAGS), count)
+    row(f"{name}: contour correction, µs", "", f"{spent:.3f}")
+
+
+def worth(folder: Path) -> None:
+    """Compare the largest contour errors of the short motion with drives that lag, and those of the simulation."""
+    program, machine = motion(6.0)[0], lagging(Machine.load("desk"))
+    module, reference = Contour(machine, folder), Reference(program, machine)
+    for on, words in ((False, "without"), (True, "with")):
+        run = module.run(commanded(6.0), LAGS, on, bound=0.5)
+        legs = run.legs[REST : REST + len(program.legs)] / 1e3
+        found = contour_um(machine, reference, legs).max()
+        row(f"desk, lags of 11 to 14 ms: µm off the path, {words} correction", "", f"{found:.2f}")
+        predicted = contour_um(machine, reference, simulate_servo(reference, correct=on).unwrap().legs).max()
+        row("  the same by `simulate`", "", f"{predicted:.2f}")
 
 
 def starts(name: str, machine: Machine, module: Compiled, count: int) -> None:
@@ -103,9 +128,11 @@ def main() -> None:
         for name, machine in machines.items():
             module = Compiled(machine, Path(scratch) / name.replace(" ", "-"), ("-Os",))
             speeds(name, machine, module, 100_000)
+            correction(name, machine, Path(scratch) / f"{name}-contour".replace(" ", "-"), 100_000)
             starts(name, machine, module, count)
             if name == "desk" and MODULE.exists():
                 against_pentakins(module, Path(scratch))
+        worth(Path(scratch) / "worth")
 
 
 if __name__ == "__main__":

@@ -13,9 +13,9 @@ from pentapod.job import Job, run
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.machine import Machine
 from pentapod.machine.drives import Drives
+from pentapod.machine.dynamics.correction import correction_for
 from pentapod.program import Program, quantised, read_csv
 from pentapod.simulate import Reference, servo, simulate_servo
-from pentapod.simulate.correction import correction_for
 from short_motion import motion, rise
 
 

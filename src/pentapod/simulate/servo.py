@@ -17,7 +17,7 @@ from pentapod.base.refusal import Refusal, stage
 from pentapod.kinematics.families.quadratic import LinearPentapod, as_quadratic
 from pentapod.kinematics.forward.quadratic import NEAR_W_SQUARED
 from pentapod.kinematics.robot import Robot
-from pentapod.simulate.correction import NO_CORRECTION, correction_for
+from pentapod.machine.dynamics.correction import NO_CORRECTION, correction_for, steps_of
 from pentapod.simulate.reference import Played, Reference
 
 
@@ -53,9 +53,8 @@ def simulate_servo(
     drives, robot = machine.drives, machine.robot
     if correct:
         as_quadratic(robot, "the correction by the pose")
-    parts = max(1, round(program.period / drives.period))
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, robot.n_legs)
-    delay = round(drives.dead_time * parts / program.period)
+    parts, delay = steps_of(drives, program.period)
     correction = correction_for(drives, program.period, parts, delay) if correct else NO_CORRECTION
     if correction is None:
         return Refusal(

@@ -8,15 +8,13 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.kinematics.forward.quadratic_kernels import poses
+from pentapod.machine.dynamics.correction import Feedback
 from pentapod.numerics.kernels import kernel
 
 RobotAndPath = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats, Floats]
 """Robot and path: linear_map (4, 5) and constant (4,) of `LinearPart`; geometry (7,): delta, x_3, y_3,
 z_3, the limits of w² and S², tool length; component (1, 2) signs, base joints (n, 3), heights (n,), path
 and path_directions (2N − 1, 3) at the rows and halfway."""
-
-Feedback = tuple[Floats, Floats, Floats, Floats, float]
-"""Fields of `Correction`: state_matrix, input_vector, feedback_gain, prefilter and lead (2, 5), memory."""
 
 
 @kernel

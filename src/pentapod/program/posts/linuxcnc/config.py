@@ -76,8 +76,8 @@ def joint_words(home: Floats, low: Floats, high: Floats, velocity: Floats, accel
     return joints
 
 
-def hal_text(legs: int) -> str:
-    """Return the HAL of a simulation of so many legs: a command is its own feedback."""
+def hal_text(legs: int, *, driven: bool = True) -> str:
+    """Return the HAL of a simulation of so many legs. driven: commands are their own feedback; else none has any."""
     lines = [
         "loadrt [KINS]KINEMATICS",
         "loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS",
@@ -86,8 +86,9 @@ def hal_text(legs: int) -> str:
         "net estop-loop iocontrol.0.user-enable-out iocontrol.0.emc-enable-in",
         "net tool-prep-loop iocontrol.0.tool-prepare iocontrol.0.tool-prepared",
         "net tool-change-loop iocontrol.0.tool-change iocontrol.0.tool-changed",
-        *(f"net leg{k + 1} joint.{k}.motor-pos-cmd => joint.{k}.motor-pos-fb" for k in range(legs)),
     ]
+    if driven:
+        lines += [f"net leg{k + 1} joint.{k}.motor-pos-cmd => joint.{k}.motor-pos-fb" for k in range(legs)]
     return "\n".join(lines) + "\n"
 
 

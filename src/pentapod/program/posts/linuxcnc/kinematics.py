@@ -30,6 +30,7 @@ from pentapod.program.posts.linuxcnc.config import (
     number,
     servo_period_ns,
 )
+from pentapod.program.posts.linuxcnc.contour import contour_files, ini_table, joint_lines
 from pentapod.program.posts.linuxcnc.module import Module, module_files, nominal_robot
 from pentapod.toolpath.formats import FORMATS
 from pentapod.toolpath.formats.rotary import AB
@@ -91,10 +92,11 @@ def kinematics_files(
     )  # fmt: skip
     code = NO_PATH if toolpath is None else _code(_checked(_within(toolpath, machine.rapid_velocity), frame))
     module = Module(machine, component, frame, (gain, gain, gain, gain * turn, gain * turn))
-    return {
-        **files_of(ini, hal_text(robot.n_legs) + _guard_text(robot.n_legs), FILE, code, robot.n_legs),
-        **module_files(module),
-    }
+    correction = contour_files(module, period)
+    hal = hal_text(robot.n_legs, driven=not correction) + _guard_text(robot.n_legs)
+    if correction:
+        hal, ini = hal + "\n".join(joint_lines(robot.n_legs)) + "\n", ini + ini_table()
+    return {**files_of(ini, hal, FILE, code, robot.n_legs), **module_files(module), **correction}
 
 
 def write_kinematics(machine: Machine, component: Branch, folder: Path) -> list[Path]:

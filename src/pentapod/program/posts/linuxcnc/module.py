@@ -60,12 +60,12 @@ class Module:
     accelerations: tuple[float, ...]
 
 
-def module_files(given: Module) -> dict[str, bytes]:
-    """Return the files of the module by name. Raises MachineError where the machine can have none."""
+def module_files(given: Module, names: tuple[str, ...] = SOURCES) -> dict[str, bytes]:
+    """Return files of the module by name. Raises MachineError where the machine can have none."""
     values: dict[str, ArrayLike] = {**module_values(given), "ACCELERATION": given.accelerations}
     values |= {item.name.upper(): getattr(GUARD, item.name) for item in fields(GUARD)}
-    words = {**module_names(given), **{name: _numbers(value) for name, value in values.items()}}
-    return {name: filled(packaged(f"kinematics/{name}").decode(), words).encode() for name in SOURCES}
+    words = {**module_names(given), **{name: c_numbers(value) for name, value in values.items()}}
+    return {name: filled(packaged(f"kinematics/{name}").decode(), words).encode() for name in names}
 
 
 def module_values(given: Module) -> dict[str, ArrayLike]:
@@ -158,11 +158,11 @@ def _pairs(given: Module) -> dict[str, ArrayLike]:
     }  # fmt: skip
 
 
-def _numbers(value: ArrayLike) -> str:
+def c_numbers(value: ArrayLike) -> str:
     """Return a number, or nested lists of them, as C: small whole numbers as they are, others hexadecimal."""
     array = np.asarray(value, dtype=np.float64)
     if array.ndim:
-        return "{" + ", ".join(_numbers(one) for one in array) + "}"
+        return "{" + ", ".join(c_numbers(one) for one in array) + "}"
     number = float(array)
     if not math.isfinite(number):
         raise MachineError("not a number of a machine", key="kinematics module", value=number)

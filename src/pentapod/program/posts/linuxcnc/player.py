@@ -8,11 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.base.errors import ProgramError
+from pentapod.base.errors import MachineError, ProgramError
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine.machine import Machine
 from pentapod.program.header import header_text
 from pentapod.program.posts.linuxcnc.config import packaged, servo_period_ns
+from pentapod.program.posts.linuxcnc.contour import HEADER, contour_files, player_lines
+from pentapod.program.posts.linuxcnc.kinematics import controller_frame
+from pentapod.program.posts.linuxcnc.module import Module, module_files
 from pentapod.program.posts.linuxcnc.stream import limit_lines
 from pentapod.program.posts.registry import PostInput
 from pentapod.program.posts.rows import read_file
@@ -31,6 +34,7 @@ def player_files(given: PostInput) -> dict[str, bytes]:
     if given.program.laser_power is not None:
         return {}
     machine = given.the_machine()
+    correction = _correction(machine, given.program)
     sources = {f"pentapod_player.{kind}": packaged(f"player/pentapod_player.{kind}") for kind in ("h", "c")}
     shared = {name: packaged(f"kinematics/{name}") for name in ("pins_2.9.h", "pins_dev.h", "install.sh")}
     return {
@@ -38,9 +42,20 @@ def player_files(given: PostInput) -> dict[str, bytes]:
         **shared,
         "player_numbers.h": numbers_text(machine, given.program).encode(),
         COEFFICIENTS: _stream(given.program),
-        "player.hal": _hal(machine, servo_period_ns(given.program.period)).encode(),
+        **correction,
+        "player.hal": _hal(machine, servo_period_ns(given.program.period), corrected=bool(correction)).encode(),
         "play.sh": packaged("play_player.sh"),
     }
+
+
+def _correction(machine: Machine, program: Program) -> dict[str, bytes]:
+    """Return the sources of the contour correction; none for a machine or drives that can have none."""
+    try:
+        module = Module(machine, program.component, controller_frame(machine, program.component), ())
+        found = contour_files(module, program.period)
+        return {**module_files(module, (HEADER,)), **found} if found else {}
+    except MachineError:
+        return {}
 
 
 def spline_coefficients(program: Program) -> Floats:
@@ -101,18 +116,20 @@ def check_coefficients(file: Path, program: Program) -> None:
         )
 
 
-def _hal(machine: Machine, period_ns: int) -> str:
+def _hal(machine: Machine, period_ns: int, *, corrected: bool) -> str:
     count = machine.robot.n_legs
     lines = [
         f"loadrt threads name1=servo-thread period1={period_ns}",
         f"loadrt streamer depth=4000 cfg={'f' * (1 + 2 * count)}",
         "loadrt pentapod_player",
+        *(["loadrt pentapod_contour"] if corrected else []),
         f"loadrt limit3 names={','.join(f'leg{k + 1}' for k in range(count))}",
         f"loadrt sampler depth=16000 cfg={'f' * (2 * count + 2)}",
         "setp sampler.0.enable 0",
         "addf streamer.0 servo-thread",
         "addf pentapod-player servo-thread",
         *(f"addf leg{leg} servo-thread" for leg in range(1, count + 1)),
+        *(["addf pentapod-contour servo-thread"] if corrected else []),
         "addf sampler.0 servo-thread",
         "net number streamer.0.pin.0 => pentapod-player.number",
         *(f"net c{k} streamer.0.pin.{k + 1} => pentapod-player.coefficient.{k}" for k in range(2 * count)),
@@ -121,6 +138,7 @@ def _hal(machine: Machine, period_ns: int) -> str:
         *(f"net limited{k + 1} leg{k + 1}.out => sampler.0.pin.{k + count}" for k in range(count)),
         f"net row pentapod-player.row => sampler.0.pin.{2 * count}",
         f"net pace pentapod-player.pace => sampler.0.pin.{2 * count + 1}",
+        *(player_lines(count) if corrected else []),
         *limit_lines(machine),
     ]
     return "\n".join(lines) + "\n"

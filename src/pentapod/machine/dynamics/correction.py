@@ -13,7 +13,7 @@ Moore, Optimal Control: Linear Quadratic Methods, 1990.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from pentapod.base.arrays import Floats
 from pentapod.machine.drives import Drives
 
-if TYPE_CHECKING:
-    from pentapod.simulate.servo_kernels import Feedback
+Feedback: TypeAlias = tuple[Floats, Floats, Floats, Floats, float]
+"""Fields of `Correction`: state_matrix, input_vector, feedback_gain, prefilter and lead (2, 5), memory."""
 
 _Complexes: TypeAlias = NDArray[np.complex128]
 
@@ -32,7 +32,10 @@ class CorrectionOptions:
     """Options of the design of a correction."""
 
     effort: float = 1e-4
-    """Weight of a metre of command against a metre of error: with less, the encoders' steps excite the drives."""
+    """Weight of a metre of command against a metre of error: with less, the encoders' steps excite the drives.
+
+    Infinite: no feedback of the model's state, the command is where the leg should be when the drive has followed it.
+    """
     frequencies: int = 256
     """Frequencies at which the amplification is checked."""
     lowest_frequency: float = 1e-3
@@ -79,6 +82,12 @@ NO_CORRECTION = Correction(np.zeros((1, 1, 1)), np.zeros((1, 1)), np.zeros((1, 1
 """For drives without correction."""
 
 
+def steps_of(drives: Drives, period: float) -> tuple[int, int]:
+    """Return how many periods of the drives there are in a controller period, and how many in their dead time."""
+    parts = max(1, round(period / drives.period))
+    return parts, round(drives.dead_time * parts / period)
+
+
 def correction_for(
     drives: Drives, period: float, parts: int, delay: int, options: CorrectionOptions = DEFAULTS
 ) -> Correction | None:
@@ -116,8 +125,10 @@ def _design(matrix: Floats, vector: Floats, options: CorrectionOptions) -> _Desi
         return None
     n, circle = len(matrix), options.circle
     position = np.eye(n)[0]
-    cost = solve_discrete_are(matrix, vector[:, None], np.outer(position, position), np.array([[options.effort]]))
-    gain = vector @ cost @ matrix / (options.effort + vector @ cost @ vector)
+    gain = np.zeros(n)
+    if np.isfinite(options.effort):
+        cost = solve_discrete_are(matrix, vector[:, None], np.outer(position, position), np.array([[options.effort]]))
+        gain = vector @ cost @ matrix / (options.effort + vector @ cost @ vector)
     closed = matrix - np.outer(vector, gain)
     static = np.linalg.solve(np.eye(n) - closed, vector)
     delayed = np.linalg.solve(np.eye(n) - closed, static)
