@@ -201,16 +201,9 @@ def _mended(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Map
         specification = dataclasses.replace(task.specification, toolpath=path)
         law, share = MENDING.law if mend.law else task.law, MENDING.closer if mend.closer else 1.0
         again = dataclasses.replace(
-            task,
-            specification=specification,
-            runner=own,
-            left_out=mend.left_out,
-            law=law,
-            closer=share,
-            gentler=MENDING.gentler if mend.gentler else 1.0,
-            placed=placed,
-            start=start,
-        )
+            task, specification=specification, runner=own, left_out=mend.left_out,
+            law=law, closer=share, gentler=MENDING.gentler if mend.gentler else 1.0, placed=placed, start=start,
+        )  # fmt: skip
         file.unlink(missing_ok=True)
         outcome = _planned(again, staging, writers)
         if outcome.passed:
