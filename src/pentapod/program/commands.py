@@ -170,7 +170,7 @@ def _forces(program: Program, machine: Machine, legs: Floats) -> Floats:
         lengths = np.linalg.norm(machine.robot.leg_vectors(position, direction), axis=-1)
         trace = np.einsum("nac,nac,na->n", loads, loads, machine.stiffness.yielding(lengths))  # at least the largest
         yields = float(np.nanmax(np.where(cutting[part], process.newtons * trace, 0.0), initial=yields))
-    velocity = np.gradient(tips, program.period, axis=0)
+    velocity = np.asarray(np.gradient(tips, program.period, axis=0), dtype=np.float64)
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
     slow = max(SLOW_M_S, FADING * yields / SMOOTH_S)
     # Of fourth powers: at twice the speed at which it fades the force lacks 1.5 %, and 0.1 % at four times it.
