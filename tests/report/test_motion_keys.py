@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import resources
+
 import numpy as np
 import pytest
 
@@ -98,3 +100,21 @@ def test_rows_that_are_kept_hold_the_others():
     assert len(kept) < 0.1 * len(times)
     between = np.column_stack([np.interp(times, times[kept], column[kept]) for column in points.T])
     assert np.linalg.norm(between - points, axis=1).max() < 1.0001e-3
+
+
+@pytest.mark.parametrize("made_good", ["gravity", "none"])
+def test_keys_tell_forces_and_deflection_as_the_verdict_does(make_job, tmp_path, made_good):
+    text = (resources.files("pentapod.machine") / "library" / "desk.toml").read_text(encoding="utf-8")
+    text = text.replace("min_length_mm", "stiffness_n_um = 20\nmin_length_mm", 1) + "\n[drives]\npeak_force_n = 300\n"
+    (tmp_path / "soft.toml").write_text(text, encoding="utf-8")
+    job = Job.load(make_job(('name = "desk"', 'file = "soft.toml"'))).with_(**{"output.compensation": made_good})
+    outcome = run(job, tmp_path / "out")
+    assert outcome.passed
+    page = write_report(outcome, tmp_path / "report.html").read_text(encoding="utf-8")
+    arrays, claims = page_arrays(page), {claim.claim: claim for claim in outcome.verdict.certificates}
+    force = claims["leg forces"]
+    assert 0.01 * arrays["key.push"].max() == pytest.approx(force.value / force.bound, abs=1e-3)
+    assert arrays["key.deflection"].max() == pytest.approx(1e3 * claims["deflection"].value, rel=1e-3)
+    scales = {scale["name"]: scale for scale in page_data(page)["motion"]["scales"]}
+    assert scales["deflection of the tip"]["worst"] == pytest.approx(arrays["key.deflection"].max(), rel=1e-3)
+    assert "deflection of the tip" in page

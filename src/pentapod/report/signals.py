@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pentapod.base.arrays import Floats, Ints, set_frozen
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
+from pentapod.machine.dynamics.deflection import Yielding
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.limits.margins import Margins
@@ -19,6 +20,7 @@ from pentapod.program.program import Program
 from pentapod.report.figure import DETAIL
 from pentapod.timing.time_law.trajectory import Profile
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
+from pentapod.verify.replay.row_forces import RowForces
 
 
 class TimeLaw(Protocol):
@@ -47,7 +49,9 @@ class Signals:
     tips, axes (N, 3); speeds (N,), m/s: of the tip, with a stand-off tool of the spot on the surface except on
     rapids; speed_limits (N,): the programmed feed, or the rapid rate; segments (N,) of the toolpath; cutting
     (N,). causes (N,): the active limit, index into `cause_names`. margins (K, M) at rows
-    `margin_rows` (K,), with those to obstacles.
+    `margin_rows` (K,), with those to obstacles. forces: of the drives; None where they have no limit.
+    deflections (N, 2): of the tip with the cutting force in the worst direction on cuts, and by masses alone, metres;
+    what drives make good is not in them. None where they are not known.
     """
 
     times: Floats
@@ -65,6 +69,8 @@ class Signals:
     margins: Floats
     margin_rows: Ints
     margin_names: tuple[str, ...]
+    forces: RowForces | None = None
+    deflections: Floats | None = None
 
     @classmethod
     def of(
@@ -97,11 +103,13 @@ class Signals:
         rows = np.unique(np.append(np.arange(0, len(times), step), len(times) - 1)).astype(np.intp)
         values = margins(tips[rows], axes[rows], program.placement)
         names = tuple(limit.name for limit in margins.limits)
-        profile = law.profile
+        profile, poses = law.profile, (tips + machine.tool_length * axes, -axes)
         at = np.clip(np.searchsorted(profile.times, times, side="right") - 1, 0, len(profile.active) - 1)
         return cls(
             times, program.legs, joined.first, joined.second, tips, axes, speeds, feeds[segments], segments,
             kinds[segments], profile.active[at], tuple(profile.constraint_names), values, rows, names,
+            _forces(machine, poses, joined, kinds[segments]),
+            _deflections(program, machine, poses, joined, kinds[segments]),
         )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -111,6 +119,25 @@ class Signals:
     def smallest_margins(self) -> Floats:
         """The smallest margin (K,) at each of `margin_rows`."""
         return self.margins.min(axis=1)
+
+
+def _forces(
+    machine: Machine, poses: tuple[Floats, Floats], joined: Interpolant, cuts: NDArray[np.bool_]
+) -> RowForces | None:
+    """Return the forces of the drives at the rows, where they have a limit."""
+    return RowForces.at(machine, poses, joined.first, joined.second, cuts) if machine.drive_forces.limited else None
+
+
+def _deflections(
+    program: Program, machine: Machine, poses: tuple[Floats, Floats], joined: Interpolant, cuts: NDArray[np.bool_]
+) -> Floats | None:
+    """Return how far the tip deflects at the rows (N, 2): see `Signals`."""
+    if not machine.yielding_known:
+        return None
+    made_good = bool(program.provenance.compensation)
+    found = Yielding.moving(machine, poses, joined.first, joined.second, made_good=made_good)
+    by_masses = np.linalg.norm(found.shift, axis=1)
+    return np.column_stack([by_masses + machine.cutting_force * found.softest * cuts, by_masses])
 
 
 def _poses(program: Program, machine: Machine) -> tuple[Floats, Floats]:

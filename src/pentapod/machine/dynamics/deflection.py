@@ -46,6 +46,20 @@ class Yielding(Value):
             np.where(firm[:, None], shift, np.inf), np.where(firm, np.maximum(most[:, -1], 0.0), np.inf), ways[..., -1]
         )
 
+    @classmethod
+    def moving(
+        cls, machine: Machine, poses: tuple[Floats, Floats], rates: Floats, accelerations: Floats, *, made_good: bool
+    ) -> Yielding:
+        """Return it for legs that move so, m/s and m/s² (N, n_legs), in poses (N, 3), by the machine's masses.
+
+        made_good: whether drives are told what the legs yield by the weight at rest; then that is not in it.
+        """
+        push = leg_pushes(machine, *poses, rates, accelerations)
+        if made_good:
+            still = np.zeros_like(rates)
+            push -= leg_pushes(machine, *poses, still, still)
+        return cls.of(machine, *poses, push)
+
 
 def tip_shift(machine: Machine, position: Floats, direction: Floats, shorter: Floats) -> Floats:
     """Return how far the tip moves (N, 3), metres, to first order, as legs get shorter (N, n_legs), metres."""

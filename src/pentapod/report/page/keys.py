@@ -82,7 +82,8 @@ class Keys:
 
     beside (B,): legs whose joints are not on the tool axis; joints (K, B, 3), metres. margins, nearest, deviations: the
     smallest margin, its limit, and the largest deviation, metres, from a key to the next. shares: of the feed. forces:
-    of the leg with the largest, for a force of 1 N on the tip in the worst direction.
+    of the leg with the largest, for a force of 1 N on the tip in the worst direction. pushes: the largest
+    share, from a key to the next, of what a drive has there. deflections: the largest of the tip. None where not known.
     """
 
     rows: Ints
@@ -93,6 +94,8 @@ class Keys:
     shares: Floats
     deviations: Floats
     forces: Floats
+    pushes: Floats | None
+    deflections: Floats | None
 
     @classmethod
     def of(cls, signals: Signals, machine: Machine, placed: PlacedPath, tolerance: float) -> Keys:
@@ -112,6 +115,8 @@ class Keys:
             signals.speeds[rows] / signals.speed_limits[rows],
             np.maximum.reduceat(_deviations(signals, placed, tolerance), rows),
             np.linalg.norm(loads, axis=-1).max(axis=-1),
+            _pushes(signals, rows),
+            None if signals.deflections is None else np.maximum.reduceat(signals.deflections[:, 0], rows),
         )  # fmt: skip
 
     def pack(self, packed: Packed, signals: Signals, kinds: Sequence[SegmentKind], period: float) -> None:
@@ -125,14 +130,18 @@ class Keys:
         packed.numbers("key.share", 100.0 * self.shares, 0.1)
         packed.numbers("key.deviation", 1e3 * self.deviations)
         packed.numbers("key.force", self.forces)
+        if self.pushes is not None:
+            packed.numbers("key.push", 100.0 * self.pushes, 0.1)
+        if self.deflections is not None:
+            packed.numbers("key.deflection", 1e6 * self.deflections)
 
-    def scales(self, tolerance: float) -> list[dict[str, Any]]:
+    def scales(self, tolerance: float, deflection: float | None) -> list[dict[str, Any]]:
         """Return by what the path can be coloured: name, array, unit, the worst and the best value, words at both ends.
 
-        tolerance: of the program against the path, metres.
+        tolerance: of the program against the path, metres. deflection: as much as is allowed of the tip, if a job says.
         """
         strongest, weakest = float(np.nanmax(self.forces)), float(np.nanmin(self.forces))
-        return [
+        scales = [
             MARGIN_SCALE,
             _scale("share of the feed", "key.share", " %", 0.0, 100.0, ("0 %", "50 %", "100 % of the feed")),
             _scale("what limits the motion", "key.cause", "", 0.0, 1.0, ()),
@@ -145,6 +154,21 @@ class Keys:
                 (f"{strongest:.3g} N", f"{weakest:.3g} N"),
             ),
         ]  # fmt: skip
+        if self.pushes is not None:
+            words = ("100 % of what a drive has", "50 %", "0 %")
+            scales.append(_scale("force of the drives", "key.push", " %", 100.0, 0.0, words))
+        if self.deflections is not None:
+            most = 1e6 * (float(np.nanmax(self.deflections)) if deflection is None else deflection)
+            words = f"{most:.3g} µm, {'the largest' if deflection is None else 'as much as is allowed'}"
+            scales.append(_scale("deflection of the tip", "key.deflection", " µm", most, 0.0, (words, "0 µm")))
+        return scales
+
+
+def _pushes(signals: Signals, rows: Ints) -> Floats | None:
+    if signals.forces is None:
+        return None
+    shares = (signals.forces.asked / signals.forces.available).max(axis=1)
+    return np.asarray(np.maximum.reduceat(shares, rows), dtype=np.float64)
 
 
 def _scale(name: str, array: str, unit: str, worst: float, best: float, ends: tuple[str, ...]) -> dict[str, Any]:

@@ -125,6 +125,7 @@ class ReportedRun:
         toolpath, program = find(Toolpath), find(Program)
         if signals is None or keys is None or toolpath is None or program is None:
             return None
+        tolerance = self.outcome.job.tolerance.si
         keys.pack(packed, signals, [segment.kind for segment in toolpath.segments], program.period)
         return {
             "start": self.least[2],
@@ -141,7 +142,7 @@ class ReportedRun:
             ],
             "kind_names": [kind.value for kind in SEGMENT_KINDS],
             "margins": signals.margin_names,
-            "scales": keys.scales(self.outcome.job.tolerance.si.path),
+            "scales": keys.scales(tolerance.path, tolerance.deflection),
         }
 
 

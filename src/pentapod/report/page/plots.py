@@ -6,14 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.machine.dynamics.deflection import Yielding, leg_pushes
 from pentapod.machine.machine import Machine
 from pentapod.report.drawings.colours import LIMIT_COLOUR, QUIET_COLOUR, leg_colour
 from pentapod.report.figure import DETAIL
 from pentapod.report.pack import Packed
 from pentapod.report.series import Curve, Row, bucket_edges, bucket_places, extremes, packed_rows
 from pentapod.report.signals import Signals
-from pentapod.verify.replay.row_forces import RowForces
 
 SPEED_COLOUR = "#296cb8"
 
@@ -34,19 +32,13 @@ def plots_of(packed: Packed, signals: Signals, machine: Machine) -> dict[str, An
         Row(title, extremes(1e3 * values, buckets), legs, np.unique([1e3 * low, 1e3 * high]).tolist(), grouped=True)
         for title, values, low, high in by_leg
     ]
-    poses = signals.tips + machine.tool_length * signals.axes, -signals.axes
-    if machine.drive_forces.limited:
+    if signals.forces is not None:
         peak = machine.drive_forces.peak_force
-        push = RowForces.at(machine, poses, signals.rates, signals.accelerations, signals.cutting).push
         ends = np.unique([-peak, peak]).tolist()
-        rows.append(Row("leg forces, N", extremes(push, buckets), legs, ends, grouped=True))
-    if machine.yielding_known:
-        push = leg_pushes(machine, *poses, signals.rates, signals.accelerations)
-        found = Yielding.of(machine, *poses, push)
-        alone = 1e6 * np.linalg.norm(found.shift, axis=1)
-        cut = alone + 1e6 * machine.cutting_force * found.softest * signals.cutting
+        rows.append(Row("leg forces, N", extremes(signals.forces.push, buckets), legs, ends, grouped=True))
+    if signals.deflections is not None:
         kinds = [Curve("with the cutting force", LIMIT_COLOUR, (6, 4)), Curve("by masses", SPEED_COLOUR)]
-        rows.append(Row("deflection of the tip, µm", extremes(np.column_stack([cut, alone]), buckets), kinds, low=0.0))
+        rows.append(Row("deflection of the tip, µm", extremes(1e6 * signals.deflections, buckets), kinds, low=0.0))
     speeds = 6e4 * np.stack([signals.speeds, signals.speed_limits], axis=1)
     moves = [Curve("as it moves", SPEED_COLOUR), Curve("feed or rapid rate", LIMIT_COLOUR, (6, 4))]
     rows.append(Row("speed, mm/min", extremes(speeds, buckets), moves, low=0.0))

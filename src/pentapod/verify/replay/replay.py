@@ -14,7 +14,7 @@ from pentapod.base.values import Value
 from pentapod.geometry.interpolant import clamped_slopes
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.machine.dynamics.deflection import Yielding, leg_pushes, tip_shift
+from pentapod.machine.dynamics.deflection import Yielding, tip_shift
 from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
 from pentapod.program.commands import springs
@@ -155,11 +155,8 @@ class Replay(Value):
         (position, direction), found = (pose[::2] for pose in self.pose), list[Yielding]()
         for part, rates, accelerations in motion_of_rows(self.program, self.slopes):
             poses = position[part], direction[part]
-            push = leg_pushes(self.machine, *poses, rates, accelerations)
-            if self.made_good is not None:
-                still = np.zeros_like(rates)
-                push -= leg_pushes(self.machine, *poses, still, still)
-            found.append(Yielding.of(self.machine, *poses, push))
+            made_good = self.made_good is not None
+            found.append(Yielding.moving(self.machine, poses, rates, accelerations, made_good=made_good))
         return Yielding(*(np.concatenate([getattr(each, name) for each in found]) for name in vars(found[0])))
 
     @cached_property
