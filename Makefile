@@ -100,7 +100,7 @@ bench-batch: $(READY)  ## many jobs killed at random against a serial run, overh
 bench-design: $(READY)  ## a machine at `desk`'s needs with smaller leg forces, proven, and the dome planned on it
 	$(BIN)/python benchmarks/design.py
 
-bench-control: $(READY)  ## kinematics module and contour correction for LinuxCNC: microseconds, errors, cold starts, against LinuxCNC's own pentakins
+bench-control: $(READY)  ## module, player and contour correction for LinuxCNC, forces, deflection and compensation: asked and reached, against pentakins and MuJoCo
 	$(BIN)/python benchmarks/control.py
 
 kernels: $(READY)  ## the list of kernels that `pentapod warm-up` compiles, from what the fast suite calls

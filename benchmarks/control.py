@@ -1,6 +1,7 @@
-"""The kinematics module and contour correction for LinuxCNC: asked and reached. Microseconds, differences, cold starts.
+"""Control: asked and reached. The module, the player and contour correction for LinuxCNC; forces and deflection.
 
-Compiled as halcompile does (-Os). Jogs in LinuxCNC itself: PENTAPOD_JOG_POSES=200 pytest
+Microseconds, differences, cold starts. Compiled as halcompile does (-Os). Forces and deflection: against MuJoCo.
+Jogs in LinuxCNC itself: PENTAPOD_JOG_POSES=200 pytest
 tests/program/posts/test_linuxcnc_by_hand.py -m slow, 40 s a pose.
 """
 
@@ -12,8 +13,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
+import mujoco
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
@@ -21,21 +24,28 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from compiled_contour import LAGS, REST, Contour, commanded, contour_um, lagging
 from compiled_kinematics import Compiled, calibrated, poses, world_of
+from elastic_legs import deflections, left
 from linuxcnc_kinematics import MODULE, asked
+from mujoco_forces import MACHINES, by_mujoco, curves, loaded
 from pentapod.kinematics import AsBuiltPentapod
 from pentapod.machine import Machine
+from pentapod.machine.dynamics.dynamics import Dynamics
 from pentapod.simulate import Reference, simulate_servo
+from pentapod.simulate.paced import Player
+from pentapod.timing.topp.engine import fastest
+from played_overrides import fast_program, off_path, played, random_overrides, shares
 from short_motion import motion
+from timing import Problem
 
 LEAST = np.array([0.1, 20.0, 0.0, 0.0, 0.0, 1.0, 1.0])
 FAST = np.array([1000.0, 1000.0, 1000.0, 289.4, 289.4])
 ROUNDS = 7
 
 
-def microseconds(work: Callable[[], object], count: int) -> float:
+def microseconds(work: Callable[[], object], count: int, rounds: int = ROUNDS) -> float:
     """Return the least CPU time of a few rounds, by one of `count`."""
     found = np.inf
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         start = time.process_time()
         work()
         found = min(found, time.process_time() - start)
@@ -111,6 +121,61 @@ def against_pentakins(module: Compiled, folder: Path) -> None:
     row("desk: legs against pentakins, mm", "1e-9", f"{np.abs(ours - 1e3 * theirs).max():.1e}")
 
 
+def overrides(seeds: int) -> None:
+    """Play a program near its limits with random steps of the override, holds and resumes among them."""
+    program, machine = fast_program()
+    player, most, off = Player(program, machine), 0.0, 0.0
+    for seed in range(seeds):
+        legs, places, _, _ = played(player, random_overrides(20_000, seed))
+        most = max(most, *shares(machine, legs, program.period))
+        off = max(off, off_path(program, legs, places))
+    row(f"player, {seeds} random overrides: largest share of a limit", "1", f"{most:.6f}")
+    row("player: legs beside the path, µm", "1", f"{1e6 * off:.1e}")
+
+
+def forces(count: int) -> None:
+    """Compare forces of the drives with MuJoCo's inverse dynamics, and time them."""
+    for name in MACHINES:
+        machine = loaded(name)
+        curve, x, u = curves(machine, count, 3)
+        ours = Dynamics.of(machine).along(curve).forces(x, u)
+        states = ([(tips[k], axes[k]) for tips, axes in curve] for k in range(count))
+        theirs = np.array([by_mujoco(mujoco, machine, at, x[k], u[k]) for k, at in enumerate(states)])
+        row(f"{name}: forces against MuJoCo, {count} states, N", "1e-6", f"{np.abs(ours - theirs).max():.1e}")
+        many, dynamics = curves(machine, 20_000, 4)[0], Dynamics.of(machine)
+        spent = microseconds(partial(dynamics.along, many), 20_000)
+        row(f"{name}: forces, µs a gridpoint", "3", f"{spent:.2f}")
+
+
+def passes(n: int) -> None:
+    """Compare a time law's passes over rows of forces, which have an offset, with those over as many without one."""
+    problem = Problem("sine", n)
+    offset = np.full_like(problem.rows[0], 0.3)
+    times = [
+        microseconds(partial(fastest, problem.s, *problem.rows, problem.ceiling, offset=weight), n)
+        for weight in (None, offset)
+    ]
+    row("time law's passes over forces, times those over accelerations", "1.2", f"{times[1] / times[0]:.2f}")
+
+
+def yielding(seeds: int) -> None:
+    """Compare deflection, and what commands leave of it, with MuJoCo where legs are springs."""
+    apart = [
+        np.linalg.norm(found - expected) / np.linalg.norm(expected)
+        for seed in range(1, seeds + 1)
+        for expected, found in deflections(seed)
+    ]
+    row(f"deflection against MuJoCo, {len(apart)} cases, %", "1", f"{100.0 * max(apart):.2f}")
+    rests: dict[tuple[str, float], list[float]] = {}
+    for seed in range(1, seeds + 1):
+        for name, softer, sag, rest in left(seed):
+            rests.setdefault((name, softer), []).append(rest / sag)
+    for (name, softer), found in rests.items():
+        bound = 20 if softer else 3 if "force" in name else 2
+        words = f", legs {softer:.0%} softer" if softer else ""
+        row(f"compensation of {name} leaves, %{words}", f"{bound}", f"{100.0 * max(found):.2f}")
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -133,6 +198,10 @@ def main() -> None:
             if name == "desk" and MODULE.exists():
                 against_pentakins(module, Path(scratch))
         worth(Path(scratch) / "worth")
+    overrides(10)
+    forces(1000)
+    passes(100_000)
+    yielding(3)
 
 
 if __name__ == "__main__":
