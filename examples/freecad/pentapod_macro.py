@@ -154,7 +154,9 @@ def run(*words, said=None):
     command = os.environ.get("PENTAPOD") or shutil.which("pentapod")
     if command is None or not os.access(command, os.X_OK):
         where = "is not on the PATH of FreeCAD" if command is None else f"cannot be run as {command}"
-        raise MacroError(f"pentapod {where}: set the environment variable PENTAPOD to its command, and start FreeCAD anew")
+        raise MacroError(
+            f"pentapod {where}: set the environment variable PENTAPOD to its command, and start FreeCAD anew"
+        )
     # The Python of FreeCAD is not that of pentapod.
     own = {name: value for name, value in os.environ.items() if name != "PYTHONHOME"}
     given = [command, *map(str, words)]
