@@ -58,7 +58,7 @@ class Solver(Protocol):
         """
         ...
 
-    def smooth(self, start: Candidate, keep: float) -> Floats | None:
+    def smooth(self, start: Candidate, keep: float, progress: Progress = silent) -> Floats | None:
         """Return coefficients (K, 2) of the smoothest spline of the axes that keeps the margin `keep`, or None.
 
         Placement and first leans are those of `start`.
