@@ -122,6 +122,17 @@ def test_progress_in_a_file_says_that_a_silent_stage_goes_on():
         assert said.wait(60.0)
 
 
+def test_progress_in_a_file_says_at_once_that_ctrl_c_ended_a_search():
+    """The command goes on with the best placement so far: one who is not told so presses it again."""
+    from pentapod.cli.progress import Lines
+
+    lines = []
+    told = Lines(lines.append, lambda: 1.0)
+    told("placement", 0.4, "component ++")
+    told("placement", 1.0, "interrupted: the best so far is kept")
+    assert lines == ["placement 100 %, 0 s so far: interrupted: the best so far is kept"]
+
+
 def test_progress_in_a_file_is_a_line_every_few_seconds():
     from pentapod.cli.progress import LINE_EVERY_S, Lines
 

@@ -22,6 +22,9 @@ LINE_EVERY_S = 5.0
 SILENT_S = 15.0
 """Seconds without a line after which one says that the stage goes on."""
 
+INTERRUPTED = "interrupted"
+"""How the note begins of a search that Ctrl-C ended with its best result so far; the command goes on, and says so."""
+
 FIRST_SHARE = 0.02
 """Share of a stage from which the time that is left is told."""
 
@@ -84,7 +87,7 @@ class Lines:
             self.stage, self.left = stage, TimeLeft(self.seen)  # many stages report first when a part of them is done
         self.seen = now
         self.last = f"{stage} {100.0 * fraction:.0f} %" if fraction > 0.0 else stage
-        if now - self.told < LINE_EVERY_S:
+        if now - self.told < LINE_EVERY_S and not note.startswith(INTERRUPTED):
             return
         self.told = now
         self.silence.heard()
