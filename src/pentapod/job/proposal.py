@@ -135,8 +135,8 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
     placement = _placement(mesh, patch, direction, machine.work)
     remarks += [
         f"a ball of {tool['diameter_mm']:g} mm, {toolpath['strategy']}, {toolpath['stepover_mm']:g} mm apart",
-        f"table_z_mm = {placement['table_z_mm']:g} is a guess, for which this part is in the middle of the work volume: "
-        "set the height of your table",
+        f"table_z_mm = {placement['table_z_mm']:g} is a guess, with which this part is in the middle of the "
+        "work volume: set the height of your table",
     ]
     tables = {
         "part": table,

@@ -139,7 +139,8 @@ def search(
         if best is None or best.smallest < NEEDED_MARGIN:
             raise
         interrupted = True
-        progress("placement", 1.0, f"interrupted: the best so far is kept, margin {best.smallest:.3f}; once more ends it")
+        kept = f"the best so far is kept, margin {best.smallest:.3f}; once more ends it"
+        progress("placement", 1.0, f"interrupted: {kept}")
     if best is None:  # not reached: there are components, and first_guesses returns some for each
         raise RuntimeError("no first guess was made")
     return Search(best, tried, count, interrupted, constraints)
