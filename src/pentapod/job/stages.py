@@ -12,7 +12,7 @@ from pentapod.base.refusal import Refusal
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.search import TOUCHES, advised
 from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, write_arrays, write_json
-from pentapod.job.build.limits import placement_limits, timing_limits
+from pentapod.job.build.limits import pose_limits, timing_limits
 from pentapod.job.build.pieces import job_part, job_piece, job_without
 from pentapod.job.build.region import covers_region
 from pentapod.job.build.specification import job_specification
@@ -166,7 +166,7 @@ def _with_ways(task: Task, program: Program, staging: Path) -> Refusal | None:
     if task.machine.park.pose is None:
         return None
     machine = program.machine(task.machine)
-    specification, kinds = dataclasses.replace(task.specification, machine=machine), placement_limits(task.job)
+    specification, kinds = dataclasses.replace(task.specification, machine=machine), pose_limits(task.job)
     made = task.runner.run("ways", lambda: ways(program, specification, limits=task.limits, kinds=kinds))
     if isinstance(made, Refusal):
         return made

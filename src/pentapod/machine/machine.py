@@ -178,6 +178,11 @@ class Machine(Value):
         return not beside and self.limb is None
 
     @property
+    def yielding_known(self) -> bool:
+        """Whether the machine says how far its legs yield, and the forces in them are known."""
+        return self.stiffness.given and self.ends_on_line
+
+    @property
     def line_top(self) -> float:
         """The least offset (metres) of a joint on the platform line: there the spindle begins."""
         return float(self.bars.offsets.min())

@@ -70,11 +70,6 @@ def compensation_sentence(program: Program, machine: Machine) -> str:
     return f"posts make good what the legs yield to weight{process}: drives are told up to {most:.3g} um more or less"
 
 
-def can_compensate(machine: Machine) -> bool:
-    """Return whether the machine says how far its legs yield, and the forces in them are known."""
-    return machine.stiffness.given and machine.ends_on_line
-
-
 def commanded(program: Program, machine: Machine | None) -> Program:
     """Return a program with rows as the drives are told them; the same one where that is what the legs read.
 
@@ -134,7 +129,7 @@ def springs(program: Program, machine: Machine, legs: Floats) -> Floats:
     longer = np.zeros_like(legs)
     if program.provenance.compensation != GRAVITY:
         return longer
-    if not can_compensate(machine):
+    if not machine.yielding_known:
         raise MachineError(
             "the program is compensated for what legs yield, but this machine does not say how far they do",
             key=COMPENSATION, value=program.provenance.compensation,

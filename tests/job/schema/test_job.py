@@ -208,6 +208,7 @@ def test_every_key_is_described_and_has_its_unit():
         "mode", "compensation",
         "matrix", "component", "interpolation", "solver", "format", "direction", "line", "directions", "remedy", "up",
         "then", "setups", "weight_strokes", "weight_singularities", "weight_joints", "weight_bodies",
+        "weight_stiffness",
         "entry", "fill", "upright", "curve", "form", "which", "laying", "centred", "text", "letter_spacing", "align",
         "towards", "effect", "levels", "threshold", "frame", "use", "waive", "lowest_share", "left_share",
         "rotary_axes", "tool", "coolant", "tool_number", "laser_power",

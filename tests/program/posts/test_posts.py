@@ -291,8 +291,11 @@ def test_the_command_refuses(tmp_path, capsys):
     (tmp_path / "plan.npz").write_bytes(b"PK nonsense")
     assert run(["post", source, "--to", "apt", "-o", str(out)]) == 2
     assert "plan.npz" in capsys.readouterr().err
-    # What has no use for the toolpath does not look at it.
-    assert run(["post", source, "--to", "pvt", "-o", str(tmp_path / "elsewhere")]) == 0
+    # The run says which machine it is for. With its name alone, what has no use for the toolpath does not look at it.
+    assert run(["post", source, "--to", "pvt", "-o", str(tmp_path / "elsewhere")]) == 2
+    assert "plan.npz" in capsys.readouterr().err
+    named = ["--machine", program.provenance.machine]
+    assert run(["post", source, "--to", "pvt", "-o", str(tmp_path / "elsewhere"), *named]) == 0
     assert capsys.readouterr().err == ""
     (tmp_path / "plan.npz").unlink()
     stranger = dataclasses.replace(program.provenance, machine="shed", machine_digest="0")

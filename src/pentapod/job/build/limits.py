@@ -6,13 +6,19 @@ from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.limits.margins import LIMITS
+from pentapod.planning.limits.tip_stiffness import STIFFNESS
 from pentapod.timing.limits.limit import NO_RESERVE, Limit
 from pentapod.timing.limits.limits import PLUGGED
 
 
-def placement_limits(job: Job) -> tuple[LimitKind, ...]:
+def pose_limits(job: Job) -> tuple[LimitKind, ...]:
     """Return the limits on poses besides pentapod's own. Raises InputError: one cannot be loaded."""
     return tuple(LIMITS.find(name) for name in job.limits.use if name in LIMITS.added)
+
+
+def placement_limits(job: Job) -> tuple[LimitKind, ...]:
+    """Return the limits on poses besides pentapod's own, and what else the placement prefers. Raises InputError."""
+    return (*pose_limits(job), *(() if job.placement.weight_stiffness is None else (STIFFNESS,)))
 
 
 def timing_limits(job: Job, machine: Machine) -> tuple[Limit, ...]:

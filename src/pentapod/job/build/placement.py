@@ -48,7 +48,13 @@ def job_constraints(job: Job, machine: Machine, mesh: Mesh) -> PlacementConstrai
 def job_weights(job: Job) -> Weights:
     """Return the weights of the margins in the job's objective."""
     table = job.placement
-    return Weights(table.weight_strokes, table.weight_singularities, table.weight_joints, table.weight_bodies)
+    return Weights(
+        table.weight_strokes,
+        table.weight_singularities,
+        table.weight_joints,
+        table.weight_bodies,
+        table.weight_stiffness or 1.0,
+    )
 
 
 def job_at(job: Job, placement: RigidTransform) -> Job:

@@ -16,8 +16,6 @@ from pentapod.machine.machine import Machine
 from pentapod.machine.parts import ControllerSettings, ToolLimits
 from pentapod.mesh.io.load import load_mesh
 from pentapod.mesh.mesh import Mesh
-from pentapod.program.commands import can_compensate
-from pentapod.program.program import GRAVITY
 from pentapod.toolpath.axis.orientation import Orientation
 from pentapod.toolpath.gouge.report import GougeOptions
 from pentapod.toolpath.strategies.registry import STRATEGIES
@@ -56,8 +54,13 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
         remedy = "give peak_force_n in [drives] or stiffness_n_um in [legs] of the machine file, or leave the force out"
         what = "the machine says nothing of the force of its drives, nor of its stiffness"
         raise job.error("feed", "cutting_force_n", what, value=cutting, remedy=remedy)
+    weight = job.placement.weight_stiffness
+    if weight is not None and not machine.yielding_known:
+        remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
+        what = "how stiff this machine is at the tip is not known"
+        raise job.error("placement", "weight_stiffness", what, value=weight, remedy=remedy)
     deflection = job.tolerance.deflection_mm
-    if deflection is not None and not (machine.stiffness.given and machine.ends_on_line):
+    if deflection is not None and not machine.yielding_known:
         remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
         what = "how far the tip deflects is not known on this machine"
         raise job.error("tolerance", "deflection_mm", what, value=deflection, remedy=remedy)
@@ -65,7 +68,7 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
     if asked == PROCESS and not cutting > 0.0:
         what, remedy = "there is no process force to make good", "give feed.cutting_force_n, or ask for gravity alone"
         raise job.error("output", "compensation", what, remedy=remedy)
-    if asked in (GRAVITY, PROCESS) and not can_compensate(machine):
+    if asked not in (None, "none") and not machine.yielding_known:
         remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
         what = "how far the legs of this machine yield is not known"
         raise job.error("output", "compensation", what, remedy=remedy)
@@ -77,9 +80,9 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
         raise job.error("tool", "length_mm", error.what) from error
 
 
-def job_compensation(job: Job, machine: Machine) -> str:
-    """Return what drives make good of how legs yield, as a program's provenance names it; machine: that of the job."""
-    return GRAVITY if job.output.compensation != "none" and can_compensate(machine) else ""
+def is_compensated(job: Job, machine: Machine) -> bool:
+    """Return whether drives make good how far legs yield by weights, by their commands; machine: that of the job."""
+    return job.output.compensation != "none" and machine.yielding_known
 
 
 def job_mesh(job: Job, progress: Progress = silent) -> Mesh:

@@ -16,7 +16,7 @@ from pentapod.geometry.solids import Cone
 from pentapod.job.artefacts import ARRAYS
 from pentapod.job.build.placement import job_at
 from pentapod.job.build.specification import job_fixture
-from pentapod.job.build.values import job_compensation, job_machine, job_mesh
+from pentapod.job.build.values import is_compensated, job_machine, job_mesh
 from pentapod.job.clamped.registration import cut_surface, planned_placement
 from pentapod.job.plan_arrays import GUIDES, JOB_FILE
 from pentapod.job.schema.job import Job
@@ -73,7 +73,7 @@ def probing_of(folder: str | Path, probe: Probe, count: int, misplaced: float = 
     )
     surface, cut = MeshDistance.of(mesh), cut_surface(job, mesh)
     found = plan_probing(machine, component, surface, placement, cut, world, head, count, misplaced)
-    if isinstance(found, Refusal) or not job_compensation(job, machine):
+    if isinstance(found, Refusal) or not is_compensated(job, machine):
         return found
     poses = machine.robot.pose(found.legs, np.array(component))
     return replace(found, legs=found.legs + weight_yields(machine, *poses))

@@ -18,7 +18,7 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.artefacts import ARRAYS
 from pentapod.job.build.placement import fixed_placement, job_at, placement_toml, pose_of
 from pentapod.job.build.region import job_region
-from pentapod.job.build.values import job_compensation, job_machine, job_mesh
+from pentapod.job.build.values import is_compensated, job_machine, job_mesh
 from pentapod.job.clamped.placed_job import read_placement
 from pentapod.job.plan_arrays import PLACEMENT
 from pentapod.job.run_folder import check_run
@@ -134,7 +134,7 @@ def register_part(
     mesh = job_mesh(job, progress)
     surface, cut = MeshDistance.of(mesh), cut_surface(job, mesh)
     try:
-        centres = read.centres(used, file, loaded=bool(job_compensation(job, used)))
+        centres = read.centres(used, file, loaded=is_compensated(job, used))
     except InputError:
         _check_order(used, read, surface, start, file)
         raise

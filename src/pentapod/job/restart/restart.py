@@ -18,7 +18,7 @@ from pentapod.base.refusal import Refusal
 from pentapod.base.values import Value
 from pentapod.geometry.polyline import arc_length
 from pentapod.job.artefacts import PROGRAM
-from pentapod.job.build.limits import placement_limits, timing_limits
+from pentapod.job.build.limits import pose_limits, timing_limits
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import job_link_style
 from pentapod.job.build.upright import may_stand, upright
@@ -93,7 +93,7 @@ def restart(job: Job, file: Path, seconds: float, progress: Progress = silent) -
         toolpath=toolpath,
         cutting=None if cutting is None else replace(cutting, coverage=Coverage.nothing("the rest of a program")),
     )
-    kinds = placement_limits(job)
+    kinds = pose_limits(job)
     margins = Margins.of(machine, before.component, whole.collision_world or NOTHING, kinds)
     placed = placed_on(toolpath, program, margins, axes)[0]
     limits, runner = timing_limits(job, machine), StageRunner(progress)

@@ -27,6 +27,12 @@ from pentapod.mesh.io.registry import MESH_FORMATS
 _VARIABLE = re.compile(r"\$\{(\w+)\}")
 Content = Mapping[str, Any]
 
+LATER_KEYS = (
+    ("output", "compensation"), ("tolerance", "deflection_mm"), ("placement", "weight_stiffness"),
+    ("placement", "table_turn_deg"),
+)  # fmt: skip
+"""Keys that a job of an earlier version does not have; left out, they are not in its digest."""
+
 
 class _TableOf:
     """Attribute of a job: its table of that name."""
@@ -170,14 +176,11 @@ class Job(Value):
             del content["limits"]
         if not self.feed.cutting_force_n:
             del content["feed"]["cutting_force_n"]
-        if self.output.compensation is None:
-            del content["output"]["compensation"]
-        if self.tolerance.deflection_mm is None:
-            del content["tolerance"]["deflection_mm"]
         if all(value is None for value in content["process"].values()):
             del content["process"]
-        if self.placement.table_turn_deg is None:
-            del content["placement"]["table_turn_deg"]
+        for table, key in LATER_KEYS:
+            if content[table][key] is None:
+                del content[table][key]
         del content["part"]["stock_mm"]
         if not self.part.flip:
             del content["part"]["flip"]

@@ -80,6 +80,14 @@ class PlacementKeys:
     weight_singularities: Annotated[float, Key("", "weight of the distances to singular poses", gt=0.0)] = 1.0
     weight_joints: Annotated[float, Key("", "weight of the angles of base and platform joints", gt=0.0)] = 1.0
     weight_bodies: Annotated[float, Key("", "weight of the gaps between bodies", gt=0.0)] = 1.0
+    weight_stiffness: Annotated[
+        float | None,
+        Key(
+            "",
+            "weight of the stiffness at the tip, of machines that give stiffness_n_um; not looked at when left out",
+            gt=0.0,
+        ),
+    ] = None
     then: Annotated[
         Literal["force", "time"] | None,
         Key(

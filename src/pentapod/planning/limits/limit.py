@@ -13,7 +13,7 @@ from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.tool_pose import ToolPose
 
-Group = Literal["strokes", "singularities", "joints", "bodies"]
+Group = Literal["strokes", "singularities", "joints", "bodies", "stiffness"]
 """The kinds of limits; each has a weight of its own (`Weights`)."""
 
 

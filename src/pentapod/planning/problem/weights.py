@@ -19,7 +19,7 @@ NEEDED_MARGIN = 0.02
 
 @dataclass(frozen=True)
 class Weights(Value):
-    """Positive weights of leg strokes, singular surfaces, joint cones and gaps between bodies.
+    """Positive weights of leg strokes, singular surfaces, joint cones, gaps between bodies, and stiffness at the tip.
 
     A margin's excess over the needed one is divided by its weight: with strokes = 2 and all else 1 the strokes keep
     twice the excess of the others. Whether a part fits does not depend on the weights. Raises ArrayError for a weight
@@ -32,6 +32,7 @@ class Weights(Value):
     singularities: float = 1.0
     joints: float = 1.0
     bodies: float = 1.0
+    stiffness: float = 1.0
 
     def __post_init__(self) -> None:
         for field in fields(self):

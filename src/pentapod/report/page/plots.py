@@ -40,7 +40,7 @@ def plots_of(packed: Packed, signals: Signals, machine: Machine) -> dict[str, An
         push = RowForces.at(machine, poses, signals.rates, signals.accelerations, signals.cutting).push
         ends = np.unique([-peak, peak]).tolist()
         rows.append(Row("leg forces, N", extremes(push, buckets), legs, ends, grouped=True))
-    if machine.stiffness.given and machine.ends_on_line:
+    if machine.yielding_known:
         push = leg_pushes(machine, *poses, signals.rates, signals.accelerations)
         found = Yielding.of(machine, *poses, push)
         alone = 1e6 * np.linalg.norm(found.shift, axis=1)

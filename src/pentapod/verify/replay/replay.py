@@ -17,7 +17,7 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.dynamics.deflection import Yielding, leg_pushes, tip_shift
 from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
-from pentapod.program.commands import can_compensate, springs
+from pentapod.program.commands import springs
 from pentapod.program.program import Program
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 from pentapod.verify.replay.free_space import PosedPolyline
@@ -81,7 +81,7 @@ class Replay(Value):
     @cached_property
     def made_good(self) -> Floats | None:
         """By how much drives are told more than the rows (N, n_legs), because legs yield, metres; None for nothing."""
-        if not (self.program.provenance.compensation and can_compensate(self.machine)):
+        if not (self.program.provenance.compensation and self.machine.yielding_known):
             return None
         return springs(self.program, self.machine, self.program.legs)
 
