@@ -29,6 +29,9 @@ Which tool length leaves the most room for the dome, and what does a leaning axi
 pentapod sweep toolpaths/sweeps/dome.toml -o sweep/
 ```
 
+The command ends with exit code 1, since {others} of the {jobs} jobs did not pass. Their rows are in
+the table all the same.
+
 ![Smallest margin and cycle time over the length of the tool](gallery/sweep.png)
 
 {table}
@@ -92,7 +95,8 @@ def main() -> None:
     rows = sorted(({**each.task.known, **each.row} for each in done), key=lambda row: (row[LENGTH], row[TILT]))
     draw(rows, DOCS / "gallery" / "sweep.png")
     text = SWEEP.read_text(encoding="utf-8")
-    page = PAGE.format(sweep=text, table=table(rows), answer=answer(rows))
+    counts = {"others": len(rows) - len(passed(rows)), "jobs": len(rows)}
+    page = PAGE.format(sweep=text, table=table(rows), answer=answer(rows), **counts)
     (DOCS / "sweep.md").write_text(page, encoding="utf-8")
 
 

@@ -17,11 +17,17 @@ import tempfile
 import threading
 from pathlib import Path
 
-import FreeCAD as App
-import MeshPart
-import numpy as np
-import Part
-import Path as Cam
+try:
+    import FreeCAD as App
+    import MeshPart
+    import numpy as np
+    import Part
+    import Path as Cam
+except ModuleNotFoundError as error:
+    raise SystemExit(
+        f"There is no module {error.name} here. This file is a macro: copy it into the folder of FreeCAD's user macros "
+        "and run it there (Macro > Macros...). Without FreeCAD use `pentapod new PART.step`, then `pentapod plan`."
+    ) from error
 
 if App.GuiUp:
     import FreeCADGui as Gui
@@ -146,8 +152,11 @@ def _words(x, y, z, speed):
 def run(*words, said=None):
     """Run pentapod and return what it prints; said: is told each line of progress. Raises MacroError."""
     command = os.environ.get("PENTAPOD") or shutil.which("pentapod")
-    if command is None:
-        raise MacroError("pentapod is not on the PATH: set the environment variable PENTAPOD to its command")
+    if command is None or not os.access(command, os.X_OK):
+        where = "is not on the PATH of FreeCAD" if command is None else f"cannot be run as {command}"
+        raise MacroError(
+            f"pentapod {where}: set the environment variable PENTAPOD to its command, and start FreeCAD anew"
+        )
     # The Python of FreeCAD is not that of pentapod.
     own = {name: value for name, value in os.environ.items() if name != "PYTHONHOME"}
     given = [command, *map(str, words)]

@@ -83,3 +83,20 @@ def test_drift_compares_two_files(file, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["tip_largest_mm"] > 0.1
     assert run(["machine", "drift", both[0], str(tmp_path / "none.toml")]) == 2
     assert "none.toml" in capsys.readouterr().err
+
+
+def test_measurements_that_were_filled_in_are_not_written_over(file, tmp_path, capsys):
+    """The empty list of the command may be; what an instrument saw, or touches, cannot be had again."""
+    kept = file.rename(tmp_path / "measurements.csv").read_bytes()
+    assert run(["calibrate", "plan", "desk", "-n", "7", "-o", str(tmp_path)]) == 2
+    assert "measurements.csv: holds measurements, which would be lost; choose another" in capsys.readouterr().err
+    assert (tmp_path / "measurements.csv").read_bytes() == kept
+    write_measurements(measured("pose", 24, 1, given=False), tmp_path / "measurements.csv", empty=True)
+    assert run(["calibrate", "plan", "desk", "-n", "7", "-o", str(tmp_path), "-q"]) == 0
+    head = "# probe_length_mm = 198\nleg1_mm,leg2_mm,leg3_mm,leg4_mm,leg5_mm\n"
+    (tmp_path / "touches.csv").write_text(head + "600,600,600,600,600\n")
+    assert run(["register", "plan", str(tmp_path), "-o", str(tmp_path)]) == 2
+    assert "touches.csv: holds touches, which would be lost" in capsys.readouterr().err
+    (tmp_path / "touches.csv").write_text(head)
+    assert run(["register", "plan", str(tmp_path), "-o", str(tmp_path)]) == 2  # another error: no run is here
+    assert "touches" not in capsys.readouterr().err

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 import time
 
 import click
@@ -95,6 +96,41 @@ def test_progress_tells_stage_share_and_time_left(monkeypatch, capfd):
     assert shown["verify"]["note"] == "rows"
     assert shown["verify"]["share"] == "40 %"
     assert shown["verify"]["left"] == "about 0 s left"
+
+
+def test_progress_in_a_file_says_that_a_silent_stage_goes_on():
+    """A stage that reports nothing for long is not taken for one that hangs; by the clock and by the thread."""
+    from pentapod.cli.progress import LINE_EVERY_S, SILENT_S, Lines
+    from pentapod.cli.silence import Silence
+
+    now, lines = [0.0], []
+    told = Lines(lines.append, lambda: now[0])
+    now[0] = SILENT_S
+    told.silence.look()
+    told("tool axis", 0.25)
+    now[0] += LINE_EVERY_S
+    told("tool axis", 0.5, "piece 3 of 4")
+    for _ in range(2):
+        now[0] += 0.6 * SILENT_S
+        told.silence.look()
+    told.silence.look()
+    assert lines == [
+        "getting ready, 15 s so far", "tool axis 50 %, about 20 s left: piece 3 of 4", "tool axis 50 %, 38 s so far",
+    ]  # fmt: skip
+    said = threading.Event()
+    with Silence(said.set, 0.01):
+        assert said.wait(60.0)
+
+
+def test_progress_in_a_file_says_at_once_that_ctrl_c_ended_a_search():
+    """The command goes on with the best placement so far: one who is not told so presses it again."""
+    from pentapod.cli.progress import Lines
+
+    lines = []
+    told = Lines(lines.append, lambda: 1.0)
+    told("placement", 0.4, "component ++")
+    told("placement", 1.0, "interrupted: the best so far is kept")
+    assert lines == ["placement 100 %, 0 s so far: interrupted: the best so far is kept"]
 
 
 def test_progress_in_a_file_is_a_line_every_few_seconds():

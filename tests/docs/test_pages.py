@@ -86,6 +86,19 @@ def test_every_command_runs_as_written(page, tmp_path, monkeypatch, capsys):
         assert played in page.read_text(encoding="utf-8")
 
 
+def test_pages_can_be_followed_one_after_the_other_in_one_folder():
+    """What one page makes is not in the way of another page, which would end there or replace the run."""
+    made: dict[str, set[str]] = {}
+    for page in RUN:
+        for line in "".join(blocks(page, "sh")).splitlines():
+            words = shlex.split(line)
+            targets = [words[k + 1] for k, word in enumerate(words) if word in ("-o", "new") and words[k + 1] != "new"]
+            for target in targets:
+                made.setdefault(Path(target).parts[0], set()).add(page.stem)
+    assert made["first"] == {"tutorial"}
+    assert [(folder, sorted(pages)) for folder, pages in made.items() if len(pages) > 1] == []
+
+
 def serve_and_interrupt(words):
     """Run `pentapod view`, where no browser opens, until it says its address; then press Ctrl-C."""
     command = [sys.executable, "-c", "from pentapod.cli.main import main; main()", *words, "--no-open"]

@@ -24,6 +24,8 @@ TEXT = re.compile(r'<text(?: class="(\w+)")? x="([-\d.]+)" y="([-\d.]+)" font-si
                   r'text-anchor="(\w+)"[^>]*>([^<]*)</text>')  # fmt: skip
 LETTER = 0.58
 """Width of the letters of a usual font as a share of their height: a little more than that of digits."""
+LIMBS = re.compile(r'<path d="(M[-\d. ]+l[-\d. ]+)" stroke="[^"]+" stroke-width="(?:1\.8|4|1\.6)"')
+"""Legs, spindle, tool, and the table's surface."""
 
 
 def spiral() -> Toolpath:
@@ -62,6 +64,18 @@ def boxes(drawing: str) -> list[tuple[str, tuple[float, float, float, float]]]:
     return found
 
 
+def crossed(drawing: str) -> list[str]:
+    """Return the words through which a leg, the spindle or the tool goes, by points along these lines."""
+    found = set()
+    for path in LIMBS.findall(drawing):
+        x, y, dx, dy = (float(v) for v in re.findall(r"-?[\d.]+", path))
+        line = np.linspace((x, y), (x + dx, y + dy), 500)
+        for label, (left, top, right, bottom) in boxes(drawing):
+            if len(label) > 2 and ((line > (left, top)) & (line < (right, bottom))).all(axis=1).any():
+                found.add(label)
+    return sorted(found)
+
+
 def check_labels(text: str) -> None:
     for drawing in drawings(text):
         width, height = (float(v) for v in re.search(r'viewBox="0 0 ([\d.]+) ([\d.]+)"', drawing).groups())
@@ -84,6 +98,7 @@ def test_setup_is_drawn_on_every_family_with_labels_apart(standing, name):
     text = setup_drawings(run, touch_off_points(run))
     assert len(drawings(text)) == 4
     check_labels(text)
+    assert [crossed(drawing) for drawing in drawings(text)] == [[]] * 4, "no leg goes through a word"
     above = drawings(text)[0]
     numbers = re.findall(r'font-weight="600"[^>]*>(\w+)</text>', above)
     assert numbers == [str(k + 1) for k in range(run.machine.robot.n_legs)]
@@ -99,7 +114,9 @@ def test_setup_is_drawn_on_every_family_with_labels_apart(standing, name):
 def test_setup_labels_are_apart_wherever_the_part_is(standing, shift, tilt):
     for turn in (0.0, 90.0, -137.0):
         run = standing("desk", shift, turn, tilt)
-        check_labels(setup_drawings(run, touch_off_points(run)))
+        text = setup_drawings(run, touch_off_points(run))
+        check_labels(text)
+        assert [crossed(drawing) for drawing in drawings(text)] == [[]] * 4, "no leg goes through a word"
 
 
 @pytest.mark.parametrize("turn", [0.0, 44.0, 90.0])

@@ -288,6 +288,8 @@ def test_the_viewer_fits_dark_and_narrow_screens(chromium, viewer, scheme, width
     seen = Opened(chromium, viewer, scheme, width)
     page = seen.page
     assert page.evaluate("document.documentElement.scrollWidth") <= width
+    reach = page.locator("#reach").bounding_box()
+    assert reach["y"] + reach["height"] <= 900.0, "whether the part fits is on the first screen"
     for details in page.locator("summary:visible").all():
         details.click()
     assert page.evaluate("document.documentElement.scrollWidth") <= width

@@ -19,6 +19,8 @@ DEEPEST = 16
 """Largest depth of nested arrays and tables."""
 
 ERROR_PLACE = re.compile(r"\(at line (\d+), column (\d+)\)")
+ONE_TABLE = "a table stands in a file once: put all its keys below the same [name]"
+_TWICE = re.compile(r"Cannot declare .* twice")
 _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w\"'-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{4 * DEEPEST}}}")
 _MANY_DIGITS = re.compile(r"\w{19,}")
@@ -57,7 +59,8 @@ def parsed(text: str, file: str | Path, wrong: type[InputError]) -> dict[str, An
         place = ERROR_PLACE.search(str(error))
         # An error at the end of the file has no place.
         line, column = (int(place[1]), int(place[2])) if place else (len(text.splitlines()), None)
-        told, remedy = str(error).split(" (at ")[0], _spelling(text.splitlines()[line - 1] if line else "")
+        told = str(error).split(" (at ")[0]
+        remedy = _spelling(text.splitlines()[line - 1] if line else "") or (ONE_TABLE if _TWICE.match(told) else None)
         raise wrong(f"not TOML: {told}", file=file, line=line, column=column, remedy=remedy) from error
     except RecursionError as error:
         raise wrong("nested too deep", file=file, line=_deepest_line(text), expected=_SHALLOW) from error

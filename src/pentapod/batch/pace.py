@@ -19,17 +19,22 @@ class Pace:
         self.new += new
 
     @property
+    def seconds(self) -> float:
+        """Seconds since the start."""
+        return self._clock() - self._start
+
+    @property
     def left(self) -> float | None:
         """Seconds that the rest will take at this pace; None where that is not known yet."""
         if not self.new:
             return None
-        return (self.total - self.done) * (self._clock() - self._start) / self.new
+        return (self.total - self.done) * self.seconds / self.new
 
     def __str__(self) -> str:
         text = f"{self.done} of {self.total}"
         if self.left is None:
             return text
-        minutes = (self._clock() - self._start) / 60.0
+        minutes = self.seconds / 60.0
         rate = f", {self.new / minutes:.3g} a minute" if minutes > 0.0 else ""
         return text + rate + (f", {_spoken(self.left)} left" if self.done < self.total else "")
 

@@ -11,11 +11,19 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pentapod.cli.silence import Silence
+
 if TYPE_CHECKING:
     from pentapod.base.progress import Progress
 
 LINE_EVERY_S = 5.0
 """Seconds between two lines; what takes less than that prints none."""
+
+SILENT_S = 15.0
+"""Seconds without a line after which one says that the stage goes on."""
+
+INTERRUPTED = "interrupted"
+"""How the note begins of a search that Ctrl-C ended with its best result so far; the command goes on, and says so."""
 
 FIRST_SHARE = 0.02
 """Share of a stage from which the time that is left is told."""
@@ -36,7 +44,9 @@ def progress_bar(*, quiet: bool) -> Generator[Progress]:
     if quiet:
         yield raising_again(silent)
     elif not sys.stderr.isatty():
-        yield raising_again(Lines(lambda line: click.echo(line, err=True)))
+        lines = Lines(lambda line: click.echo(line, err=True))
+        with lines.silence:
+            yield raising_again(lines)
     else:
         with _bars() as show:
             yield raising_again(show)
@@ -59,11 +69,16 @@ class TimeLeft:
 
 
 class Lines:
-    """A Progress that prints a line every few seconds: stage, share, time left, note."""
+    """A Progress that prints a line every few seconds: stage, share, time left, note.
+
+    silence: prints one while nothing is reported.
+    """
 
     def __init__(self, echo: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
         self.echo, self.clock = echo, clock
         self.stage, self.told, self.seen, self.left = "", clock(), clock(), TimeLeft(clock())
+        self.last = "getting ready"
+        self.silence = Silence(self._goes_on, SILENT_S, clock)
 
     def __call__(self, stage: str, fraction: float, note: str = "") -> None:
         """Print a line if it is time."""
@@ -71,11 +86,18 @@ class Lines:
         if stage != self.stage:
             self.stage, self.left = stage, TimeLeft(self.seen)  # many stages report first when a part of them is done
         self.seen = now
-        if now - self.told < LINE_EVERY_S:
+        self.last = f"{stage} {100.0 * fraction:.0f} %" if fraction > 0.0 else stage
+        if now - self.told < LINE_EVERY_S and not note.startswith(INTERRUPTED):
             return
-        self.told, share = now, f" {100.0 * fraction:.0f} %" if fraction > 0.0 else ""
+        self.told = now
+        self.silence.heard()
         more = self.left.text(now, fraction) or f"{now - self.left.began:.0f} s so far"
-        self.echo(f"{stage}{share}, {more}{f': {note}' if note else ''}")
+        self.echo(f"{self.last}, {more}{f': {note}' if note else ''}")
+
+    def _goes_on(self) -> None:
+        """Print that the stage goes on."""
+        self.told = self.clock()
+        self.echo(f"{self.last}, {self.told - self.left.began:.0f} s so far")
 
 
 @contextmanager

@@ -20,6 +20,7 @@ from pentapod.job.outcome import Outcome
 from pentapod.planning.leg_path.leg_path import LegPath
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.program.program import Program
+from pentapod.timing.explain import Cause, Explanation
 from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.timing.time_law.trajectory import Profile, Trajectory
 from pentapod.toolpath.formats.npz import toolpath_arrays
@@ -56,6 +57,14 @@ PROFILE_FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
 }
 """Arrays of a time law's profile: kinds of numbers, as NumPy names them, and shapes."""
 
+STORY_FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
+    "explanation.causes": ("U", (None,)),
+    "explanation.time_s": ("f", (None,)),
+    "explanation.cost_s": ("f", (None,)),
+    "explanation.lower_bound_s": ("f", ()),
+}
+"""Arrays of the limits on the motion: their names, how long each holds, and the time lost there to the lower bound."""
+
 GUIDES = "placed.guides_mm"
 """Positions of the base joints along their guides, for a reconfigurable machine."""
 
@@ -70,6 +79,12 @@ def profile_of(arrays: Mapping[str, NDArray[Any]]) -> Profile:
         times, to_si(stations, "mm"), to_si(speeds, "mm_s"), active.astype(np.intp), shares,
         tuple(str(name) for name in names),
     )  # fmt: skip
+
+
+def story_of(arrays: Mapping[str, NDArray[Any]]) -> Explanation:
+    """Return the explanation of a cycle time that plan.npz has in arrays of `STORY_FORMS`: the limits, no places."""
+    names, times, costs, bound = (arrays[name].tolist() for name in STORY_FORMS)
+    return Explanation(sum(times), bound, tuple(map(Cause, names, times, costs)), ())
 
 
 def job_file_of(folder: Path) -> Path | None:
@@ -96,6 +111,8 @@ def arrays_of(outcome: Outcome, folder: Path) -> Arrays:
         arrays |= _leg_path(path)
     if (trajectory := outcome.find(Trajectory)) is not None:
         arrays |= _trajectory(trajectory)
+    if (story := outcome.find(Explanation)) is not None:
+        arrays |= _story(story)
     if (program := outcome.find(Program)) is not None:
         arrays |= _in_units({"program.time_s": program.times, "program.legs_mm": program.legs})
     return arrays
@@ -164,6 +181,15 @@ def _leg_path(path: LegPath) -> Arrays:
         "leg_path.legs_second_per_mm": np.concatenate(values[2]),
     }
     return _in_units(arrays)
+
+
+def _story(story: Explanation) -> Arrays:
+    causes = story.causes
+    values = (
+        np.array([cause.name for cause in causes]), np.array([cause.time for cause in causes]),
+        np.array([cause.cost for cause in causes]), np.array(story.lower_bound),
+    )  # fmt: skip
+    return dict(zip(STORY_FORMS, values, strict=True))
 
 
 def _trajectory(trajectory: Trajectory) -> Arrays:

@@ -129,11 +129,14 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
         toolpath["steep_deg"] = OPTIONS.steep_deg
         reasons["toolpath", "steep_deg"] = "upright walls get waterlines: passes of a raster do not cover all of them"
         remarks.append(f"upright walls, {100.0 * walls:.2g} % of what faces {side}, get waterlines (steep_deg)")
-    reasons["placement", "table_z_mm"] = "in the middle of the work volume; set the height of your table"
+    reasons["placement", "table_z_mm"] = (
+        "a guess: half the height of what is machined is then in the middle of the work volume; set that of your table"
+    )
     placement = _placement(mesh, patch, direction, machine.work)
     remarks += [
         f"a ball of {tool['diameter_mm']:g} mm, {toolpath['strategy']}, {toolpath['stepover_mm']:g} mm apart",
-        f"table_z_mm = {placement['table_z_mm']:g} is a guess: set the height of your table",
+        f"table_z_mm = {placement['table_z_mm']:g} is a guess, with which this part is in the middle of the "
+        "work volume: set the height of your table",
     ]
     tables = {
         "part": table,

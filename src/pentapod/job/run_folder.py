@@ -109,6 +109,17 @@ def check_run(folder: Path) -> None:
         )  # fmt: skip
 
 
+def tidied(folder: Path, *, is_new: bool) -> None:
+    """Complete or remove what a killed run left in a folder; is_new: that run made the folder, which goes if empty."""
+    if folder.is_dir():
+        with locked(folder):
+            _complete(folder)
+            remove_unfinished(folder)
+        if is_new:
+            with contextlib.suppress(OSError):  # not empty
+                folder.rmdir()
+
+
 @contextmanager
 def locked(folder: Path, *, make: bool = False) -> Generator[bool]:
     """Hold the folder's lock; yield False where the file system has none. Raises InputError where another holds it.

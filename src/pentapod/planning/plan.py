@@ -103,7 +103,7 @@ def plan(
     leans = problem.leans(best.coefficients)
     if problem.samples.tilt > 0.0:
         progress("tool axis", 0.0, f"smallest margin {best.smallest:.3f}")
-        smooth = SOLVERS[solver](problem, False).smooth(best, min(keep, best.smallest))
+        smooth = SOLVERS[solver](problem, False).smooth(best, min(keep, best.smallest), progress)
         leans = leans if smooth is None else AxisSpline.of(problem.samples, problem.cone).leans(smooth)
     return _path(toolpath, problem, best, leans, found.choice)
 

@@ -188,6 +188,15 @@ def touches_text(touches: Touches) -> str:
     return "\n".join(lines) + "\n"
 
 
+def has_touches(path: str | Path) -> bool:
+    """Whether there is a list of touches with at least one row below its head and its column names."""
+    file = Path(path)
+    if not file.is_file():
+        return False
+    lines = file.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+    return sum(bool(line.strip()) and not line.startswith("#") for line in lines) > 1
+
+
 def _head(text: str, file: Path) -> Any:
     found = parsed(text, file, InputError)
     content = {key: tuple(cast("list[Any]", v)) if isinstance(v, list) else v for key, v in found.items()}

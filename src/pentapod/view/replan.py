@@ -1,4 +1,4 @@
-"""Planning again with the part at the placement to which it was dragged, in a thread that can be cancelled."""
+"""Planning again with the part at the placement to which it was dragged, in a process that can be cancelled."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ from typing import Any
 from pentapod.base.errors import PentapodError
 from pentapod.base.progress import Progress, silent
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job.artefacts import REPORT, SHEET
+from pentapod.job.artefacts import MANIFEST, REPORT, SHEET
 from pentapod.job.build.placement import job_at, placement_toml
 from pentapod.job.outcome import Outcome
 from pentapod.job.pipeline import run as run_job
+from pentapod.job.run_folder import tidied
 from pentapod.report import write_report
 from pentapod.report.sheet import write_sheet
+from pentapod.view.apart import Apart, EndedError
 from pentapod.view.opened_run import OpenedRun, run_of
 
 FOLDER = "replanned"
@@ -24,10 +26,6 @@ FOLDER = "replanned"
 
 PATIENCE_S = 10.0
 """Seconds for which the end of a cancelled plan is waited for."""
-
-
-class Cancelled(SystemExit):
-    """Planning was cancelled; as SIGTERM does, it ends a search without its best result so far."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +41,17 @@ class Replanned:
     table: str
 
 
+def folder_of(run: OpenedRun) -> Path:
+    """Return the folder into which a run is planned again."""
+    return run.folder if run.folder.name == FOLDER else run.folder / FOLDER
+
+
 def replanned(run: OpenedRun, placement: RigidTransform, progress: Progress = silent) -> Replanned:
     """Plan the run's job, or its set-up's piece of it, with the part fixed at a placement, all artefacts included.
 
     With `table` as [placement] in the job file, `verify` accepts the program.
     """
-    job = job_at(run.job, placement)
-    folder = run.folder if run.folder.name == FOLDER else run.folder / FOLDER
+    job, folder = job_at(run.job, placement), folder_of(run)
     outcome = run_job(job, folder, progress, piece=run.piece, writers={REPORT: write_report, SHEET: write_sheet})
     return Replanned(outcome, run_of(outcome, folder), folder, placement_toml(job.placement))
 
@@ -61,6 +63,7 @@ class Replanning:
         """Keep what to call with a result; it returns what the page says of it."""
         self._say, self._alone, self._ends = say, threading.Lock(), threading.Event()
         self._thread: threading.Thread | None = None
+        self._process: Apart | None = None
         self._now: tuple[str, float, str] = ("", 0.0, "")
         self._news: dict[str, Any] = {}
 
@@ -76,14 +79,16 @@ class Replanning:
         if not self._alone.acquire(blocking=False):
             return False
         self._ends.clear()
-        self._now, self._news = ("mesh", 0.0, ""), {}
+        self._now, self._news = ("getting ready", 0.0, ""), {}
         self._thread = threading.Thread(target=self._plan, args=(run, placement), daemon=True)
         self._thread.start()
         return True
 
     def cancel(self) -> None:
-        """End the plan at its next report of progress; its folder stays as it was."""
+        """End the plan; its folder stays as it was."""
         self._ends.set()
+        if self._process is not None:
+            self._process.end()
 
     def stop(self) -> None:
         """Cancel, and wait for the end."""
@@ -93,18 +98,33 @@ class Replanning:
 
     def _plan(self, run: OpenedRun, placement: RigidTransform) -> None:
         try:
-            self._news = self._say(replanned(run, placement, self._progress))
-        except Cancelled:
-            self._news = {"text": "Cancelled. The files are as they were.", "passed": True}
+            before, is_new = _manifest(run), not folder_of(run).exists()
+            self._process = Apart()
+            if self._ends.is_set():  # it came before there was a process
+                self._process.end()
+            try:
+                self._news = self._say(self._process.result(replanned, run, placement, progress=self._progress))
+            except EndedError:
+                tidied(folder_of(run), is_new=is_new)
+                ended = "Cancelled." if self._ends.is_set() else "The process that planned has died."
+                same = (
+                    "The files are as they were." if _manifest(run) == before else "The new files were there already."
+                )
+                self._news = {"text": f"{ended} {same}", "passed": self._ends.is_set()}
         except PentapodError as error:
             self._news = {"text": str(error), "passed": False}
         except Exception as error:
             self._news = {"text": f"An error of pentapod: {error!r}", "passed": False}
             raise
         finally:
+            self._process = None
             self._alone.release()
 
     def _progress(self, stage: str, fraction: float, note: str = "") -> None:
-        if self._ends.is_set():  # raised at each report: a library may drop one
-            raise Cancelled
         self._now = stage, fraction, note
+
+
+def _manifest(run: OpenedRun) -> bytes:
+    """Return the list of files of the run that was planned again before; empty where there is none."""
+    file = folder_of(run) / MANIFEST
+    return file.read_bytes() if file.is_file() else b""

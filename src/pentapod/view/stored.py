@@ -19,10 +19,11 @@ from pentapod.geometry.polyline import arc_length
 from pentapod.job.artefacts import ARRAYS, VERDICT
 from pentapod.job.build.limits import placement_limits
 from pentapod.job.outcome import Outcome
-from pentapod.job.plan_arrays import PIECE_STARTS, PROFILE_FORMS, profile_of
+from pentapod.job.plan_arrays import PIECE_STARTS, PROFILE_FORMS, STORY_FORMS, profile_of, story_of
 from pentapod.job.stage_runner import Stage
 from pentapod.planning import PlacedPath, Placement
 from pentapod.planning.limits.margins import Margins
+from pentapod.timing.explain import Explanation
 from pentapod.timing.time_law.trajectory import Profile
 from pentapod.verify.verdict.verdict import Certificate, NotJudged, Place, Sources, Verdict
 from pentapod.view.opened_run import OpenedRun
@@ -92,18 +93,29 @@ def stored_law(run: OpenedRun, placed: PlacedPath) -> StoredLaw | None:
 
 
 def stored_outcome(run: OpenedRun, placed: PlacedPath) -> Outcome:
-    """Return the outcome of a run: its values, its verdict, and its refusal where it has one.
+    """Return the outcome of a run: its values, the limits on its motion, its verdict, and its refusal if it has one.
 
-    Raises InputError where verdict.json is broken.
+    Raises InputError where verdict.json or plan.npz is broken.
     """
     content = _verdict_content(run.folder / VERDICT)
     try:
         verdict, refusal = _verdict(content), _refusal(content.get("refusal"))
     except (TypeError, ValueError, KeyError, AttributeError) as error:
         raise InputError("a broken verdict", file=run.folder / VERDICT, remedy="plan the job again") from error
-    values = (run.mesh, run.toolpath, placed, run.program, run.piece, refusal)
+    values = (run.mesh, run.toolpath, placed, run.program, run.piece, _story(run), refusal)
     stages = tuple(Stage("read back", 0.0, value) for value in values if value is not None)
     return Outcome(run.job, run.machine, stages, verdict)
+
+
+def _story(run: OpenedRun) -> Explanation | None:
+    """Return the limits on the motion of a run; None where there is no program, or an older version planned it."""
+    file = run.folder / ARRAYS
+    arrays = read_arrays(file, (), InputError, optional=STORY_FORMS)
+    if run.program is None or len(arrays) < len(STORY_FORMS):
+        return None
+    for name, form in STORY_FORMS.items():
+        check_array(arrays[name], name, file, InputError, *form)
+    return story_of(arrays)
 
 
 def _verdict_content(file: Path) -> Mapping[str, Any]:

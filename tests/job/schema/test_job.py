@@ -73,6 +73,7 @@ MISTAKES = {  # what is replaced, and the pieces that the message must hold
         ("job.toml:1: tilt_deg", 'did you mean "axis.tilt_deg"'),
     ),
     "not TOML": (("[feed]", "[feed"), ("job.toml:19:6", "not TOML")),
+    "table twice": ((FEED, f"{FEED}\n[part]\nscale = 2"), ("twice", "put all its keys below the same [name]")),
     "key twice": ((FEED, f"{FEED}\n{FEED}"), ("job.toml:21", "not TOML")),
     "no such mesh": (('"part.stl"', '"prat.stl"'), ("job.toml:2", "part.mesh", "prat.stl", "no such file")),
     "mesh is a folder": (('"part.stl"', '"."'), ("part.mesh", "is not a file")),

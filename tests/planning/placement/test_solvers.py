@@ -64,6 +64,20 @@ def test_the_result_recomputed_is_what_was_claimed(problem, raised):
     assert values.min() == pytest.approx(raised.smallest, abs=1e-12)
 
 
+def test_smoothing_reports_each_step_and_can_be_ended_there(problem, raised):
+    """On a long path a step takes seconds: who waits sees that it goes on, and who cancels is heard."""
+
+    def cancelling(stage, fraction, note):
+        seen.append((stage, note))
+        if len(seen) == 2:
+            raise KeyboardInterrupt
+
+    seen, keep = [], 0.9 * raised.smallest
+    with pytest.raises(KeyboardInterrupt):
+        SequentialSolver(problem, free=False).smooth(raised, keep, cancelling)
+    assert seen == [("tool axis", "smoothing, step 1"), ("tool axis", "smoothing, step 2")]
+
+
 def test_smooth_axes_match_the_reference(problem, raised):
     """The same problem at a given placement: the same optimum to 0.1 %."""
     keep, spline = 0.9 * raised.smallest, AxisSpline.of(problem.samples, problem.cone)

@@ -87,6 +87,7 @@ def fit(
     return 0 if refused is None else 1
 
 
+_TOUCHES = "touches.csv"
 _SIZE = Real(0.0, min_open=True)
 
 
@@ -115,12 +116,18 @@ def plan(folder: Path, out: Path, count: int, *, as_json: bool, quiet: bool, **g
     program adds the legs at each trip, and expected.csv: the touches if the part stands as planned, to rehearse
     `register`.
     """
+    from pentapod.base.errors import InputError
     from pentapod.base.files import atomic_write
     from pentapod.base.refusal import Refusal
     from pentapod.base.units import to_si
     from pentapod.job.clamped.probing import Probe, probing_of
-    from pentapod.registration.touches import touches_text
+    from pentapod.registration.touches import has_touches, touches_text
 
+    if has_touches(out / _TOUCHES):
+        raise InputError(
+            "holds touches, which would be lost", file=out / _TOUCHES,
+            remedy="choose another folder with -o, or move this file away",
+        )  # fmt: skip
     tip = 0.5 * float(to_si(given["tip_mm"], "mm"))
     probe = Probe(
         to_si(given["length_mm"], "mm"), tip, to_si(given["stylus_mm"], "mm"), 0.5 * tip,
@@ -134,8 +141,8 @@ def plan(folder: Path, out: Path, count: int, *, as_json: bool, quiet: bool, **g
         return 1
     out.mkdir(parents=True, exist_ok=True)
     files = {
-        "probing.ngc": found.gcode("touches.csv"),
-        "touches.csv": touches_text(found.head),
+        "probing.ngc": found.gcode(_TOUCHES),
+        _TOUCHES: touches_text(found.head),
         "expected.csv": touches_text(found.expected),
     }
     for name, text in files.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -11,6 +12,7 @@ import click
 
 from pentapod.cli.numbers import Real, Whole
 from pentapod.cli.output import echo_json, json_option, quiet_option
+from pentapod.cli.silence import Silence
 
 if TYPE_CHECKING:
     from pentapod.batch import Done
@@ -20,6 +22,9 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 SHOWN = 100
 """Characters of a cause on a line of progress."""
+
+SILENT_S = 20.0
+"""Seconds without a job that is done after which a line says that the others go on."""
 
 
 def _options(command: Command) -> Command:
@@ -86,14 +91,18 @@ def _run(
     options = EngineOptions(memory=1e6 * memory, most=most)
     running = run(jobs, out, workers=workers, scheduler=scheduler, parquet=parquet, options=options)
     pace, counts = Pace(len(running)), Counter[str]()
-    if not (quiet or as_json):
+    tells = not (quiet or as_json)
+    if tells:
         click.echo(f"{_jobs(len(running))} in {out}; Ctrl-C keeps what is done", err=True)
+    silence = Silence(lambda: click.echo(f"[{pace}] {pace.seconds:.0f} s so far", err=True), SILENT_S)
     try:
-        for done in running:
-            pace.count(new=done.new)
-            counts[done.status] += 1
-            if done.new and not (quiet or as_json):
-                click.echo(_line(done, pace), err=True)
+        with silence if tells else nullcontext():
+            for done in running:
+                pace.count(new=done.new)
+                counts[done.status] += 1
+                if done.new and tells:
+                    click.echo(_line(done, pace), err=True)
+                    silence.heard()
     except (KeyboardInterrupt, SystemExit):
         click.echo(f"{pace}; what is done is in {out}: the same command goes on from there", err=True)
         raise

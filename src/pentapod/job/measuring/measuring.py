@@ -21,7 +21,7 @@ from pentapod.job.measuring.order import short_order
 from pentapod.kinematics.component import Component
 from pentapod.kinematics.robot import Branch
 from pentapod.machine.identification.measurements import Measurements
-from pentapod.machine.identification.measurements_file import write_measurements
+from pentapod.machine.identification.measurements_file import is_filled_in, write_measurements
 from pentapod.machine.identification.pose_choice import choose_poses, predicted_tip_error
 from pentapod.machine.machine import Machine
 from pentapod.planning import PlacementConstraints, leg_path, plan
@@ -91,10 +91,16 @@ def plan_measuring(
     """Choose poses, write program.csv, verdict.json and an empty measurements.csv into `out`, return the plan.
 
     component: by default that of the middle of the work volume. Returns a Refusal where the ways between the poses
-    cannot be driven. Raises InputError: a count below 2, more than there are poses, a folder that cannot be written.
+    cannot be driven. Raises InputError: a count below 2, more than there are poses, a folder that cannot be written or
+    that has measurements.
     """
     folder = Path(out)
     check_folder(folder)
+    if is_filled_in(folder / MEASUREMENTS):
+        raise InputError(
+            "holds measurements, which would be lost", file=folder / MEASUREMENTS,
+            remedy="choose another folder with -o, or move this file away",
+        )  # fmt: skip
     branch = component or _usual(machine)
     progress("poses", 0.0)
     every = candidates(machine, branch, instruments, seed)

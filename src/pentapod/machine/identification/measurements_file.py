@@ -94,6 +94,17 @@ def write_measurements(measured: Measurements, path: str | Path, *, empty: bool 
     return Path(path)
 
 
+def is_filled_in(path: str | Path) -> bool:
+    """Whether there is a measurements file with something in the cells for what the instrument sees."""
+    file = Path(path)
+    if not file.is_file():
+        return False
+    lines = [line for line in file.read_text(encoding="utf-8-sig", errors="replace").splitlines() if line[:1] != "#"]
+    titles, *rows = [line.split(",") for line in lines if line.strip()] or [[]]
+    first = 1 + max((k for k, name in enumerate(titles) if name.strip() in LEG_COLUMNS), default=-1)
+    return any(cell.strip() for row in rows for cell in row[first:])
+
+
 def read_measurements(path: str | Path) -> Measurements:
     """Return the measurements of a file; poses whose seen cells are all empty were not measured and are left out.
 

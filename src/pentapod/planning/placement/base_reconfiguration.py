@@ -75,7 +75,8 @@ def reconfigured(
         if best[1].best.smallest < NEEDED_MARGIN:
             raise
         best = best[0], replace(best[1], interrupted=True)
-        progress("placement", 1.0, f"interrupted: the best so far is kept, margin {best[1].best.smallest:.3f}")
+        kept = f"the best so far is kept, margin {best[1].best.smallest:.3f}; once more ends it"
+        progress("placement", 1.0, f"interrupted: {kept}")
     return best
 
 

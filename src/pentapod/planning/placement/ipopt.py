@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
+from pentapod.base.progress import Progress, silent
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.problem.formulation import point_function, room_function, stepped
 from pentapod.planning.problem.linear_model import valleys
@@ -98,13 +99,14 @@ class IpoptSolver:
             rows, kinds = more
         return best
 
-    def smooth(self, start: Candidate, keep: float) -> Floats | None:
+    def smooth(self, start: Candidate, keep: float, progress: Progress = silent) -> Floats | None:
         """Return coefficients (K, 2) of the smoothest spline at the placement of `start` that keeps the margin `keep`.
 
         All waypoints at once, and all kinds of margin that are near `keep` at the start. None where IPOPT finds none.
         """
         import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
+        progress("tool axis", 0.0, "smoothing, all waypoints at once")
         problem, samples = self.problem, self.problem.samples
         spline = AxisSpline.of(samples, problem.cone)
         count, first = len(samples.tilt_centres), spline.fitted(problem.leans(start.coefficients))

@@ -58,7 +58,7 @@ class Solver(Protocol):
         """
         ...
 
-    def smooth(self, start: Candidate, keep: float) -> Floats | None:
+    def smooth(self, start: Candidate, keep: float, progress: Progress = silent) -> Floats | None:
         """Return coefficients (K, 2) of the smoothest spline of the axes that keeps the margin `keep`, or None.
 
         Placement and first leans are those of `start`.
@@ -139,7 +139,8 @@ def search(
         if best is None or best.smallest < NEEDED_MARGIN:
             raise
         interrupted = True
-        progress("placement", 1.0, f"interrupted: the best so far is kept, margin {best.smallest:.3f}")
+        kept = f"the best so far is kept, margin {best.smallest:.3f}; once more ends it"
+        progress("placement", 1.0, f"interrupted: {kept}")
     if best is None:  # not reached: there are components, and first_guesses returns some for each
         raise RuntimeError("no first guess was made")
     return Search(best, tried, count, interrupted, constraints)

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
+from pentapod.base.progress import Progress, silent
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.curvature import Curvature
@@ -94,9 +95,9 @@ class SequentialSolver:
             rows = np.union1d(rows, _smallest(values, self.options.lowest))
         return best
 
-    def smooth(self, start: Candidate, keep: float) -> Floats | None:
+    def smooth(self, start: Candidate, keep: float, progress: Progress = silent) -> Floats | None:
         """Return coefficients (K, 2) of the smoothest spline at the placement of `start` that keeps `keep`."""
-        return smoothed(self.problem, start, keep)
+        return smoothed(self.problem, start, keep, progress=progress)
 
     def _waypoints(self, start: Candidate) -> Ints:
         """Return the waypoints of the first round."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.progress import Progress, silent
 from pentapod.numerics.convex.banded_qp import NO_ROWS, BandedQP
 from pentapod.planning.problem.formulation import Slopes, lean_slopes
 from pentapod.planning.problem.linear_model import valleys
@@ -78,13 +79,18 @@ class _Model:
 
 
 def smoothed(
-    problem: PlacementProblem, start: Candidate, keep: float, options: SmoothingOptions = OPTIONS
+    problem: PlacementProblem,
+    start: Candidate,
+    keep: float,
+    options: SmoothingOptions = OPTIONS,
+    progress: Progress = silent,
 ) -> Floats | None:
     """Return coefficients (K, 2) of the smoothest spline of the axes that keeps the margin `keep`.
 
-    It starts at the leans of `start` and keeps its placement. None where no such spline was found.
+    It starts at the leans of `start` and keeps its placement. None where no such spline was found. progress: gets a
+    report after each program; how many there will be is not known.
     """
-    run = _Smoothing(problem, start, keep, options)
+    run = _Smoothing(problem, start, keep, options, progress)
     run.begin()
     for _ in range(options.rounds):
         found = run.smoothest()
@@ -100,8 +106,11 @@ class _Smoothing:
     (M,): which margins have been near the one to keep. radius: of the trust region; accuracy: of the next program.
     """
 
-    def __init__(self, problem: PlacementProblem, start: Candidate, keep: float, options: SmoothingOptions) -> None:
+    def __init__(
+        self, problem: PlacementProblem, start: Candidate, keep: float, options: SmoothingOptions, progress: Progress
+    ) -> None:
         self.problem, self.start, self.keep, self.options = problem, start, keep, options
+        self.progress, self.programs = progress, 0
         self.spline = AxisSpline.of(problem.samples, problem.cone)
         self.objective = AxisCost(problem, self.spline, start, options.cost)
         self.slopes: dict[tuple[int, ...], Slopes] = {}
@@ -213,6 +222,8 @@ class _Smoothing:
         missed: see `_Model.missed`; tried: coefficients at which the penalty is evaluated, besides the model's; None
         for no penalty.
         """
+        self.programs += 1
+        self.progress("tool axis", 0.0, f"smoothing, step {self.programs}")
         spline = self.spline
         touched, point = np.unique(model.rows, return_inverse=True)
         basis = spline.basis[touched]

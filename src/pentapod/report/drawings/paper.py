@@ -1,4 +1,4 @@
-"""Paper: a drawing in SVG whose letters keep their size, with dimensions, and labels that do not lie on each other."""
+"""Paper: a drawing in SVG whose letters keep their size, with dimensions, and labels that lie on nothing else."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from html import escape
 import numpy as np
 
 from pentapod.base.arrays import Floats
+from pentapod.report.drawings.boxes import LETTER, Box, Place, box_of, common, size, through, width_of
 from pentapod.report.drawings.svg_paths import ARROW, arrow_head, path_through
-
-LETTER = 11.0
-"""Height of letters, in units of the drawing; a unit is a CSS pixel where the drawing is as wide as it was made."""
-
-LETTER_WIDTH = 0.65
-"""Width of a letter as a share of its height, rather too much."""
-
-Box = tuple[float, float, float, float]
-Place = tuple[float, float, str]
-"""Where a label may stand: x and y of its base line, and which point of it that is ("start", "middle", "end")."""
 
 _AROUND = tuple(sorted(np.ndindex(5, 5), key=lambda k: ((k[0] - 2) ** 2 + (k[1] - 2) ** 2, k)))
 """Steps beside a point, from 2 on, the nearest first: the disc of a point goes to the first one that is free."""
+
+CROSSED = 0.1
+"""Area of a text on another one, in square units, that is as bad as a unit of a line through a text."""
+
+STEPS = (-13.0, 13.0, -26.0, 26.0, -39.0, 39.0, -52.0, 52.0)
+"""How far up and down a label may be from its point, where there is no room beside it."""
+
+FAR = 14.0
+"""Distance of a label from its point, from which on a line leads there."""
 
 _HALO = "paint-order:stroke;stroke:var(--sheet,#fff);stroke-width:3px;stroke-linejoin:round"
 
@@ -52,6 +52,7 @@ class Paper:
     parts: list[str] = field(default_factory=list[str])
     taken: list[Box] = field(default_factory=list[Box])
     discs: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
+    strokes: list[Floats] = field(default_factory=list[Floats])
 
     @property
     def height(self) -> float:
@@ -84,6 +85,11 @@ class Paper:
     def line(self, points: Floats, colour: str = "currentColor", width: float = 1.0, more: str = "") -> None:
         """Draw a line through points (K, 2), mm."""
         self._path(path_through([self.at(points)]), colour, width, f'fill="none" {more}')
+
+    def bar(self, points: Floats, colour: str, width: float, more: str = "") -> None:
+        """Draw a line through points (K, 2), mm, and keep labels off it."""
+        self.line(points, colour, width, more)
+        self.cross(*self.at(points))
 
     def lines(self, lines: Iterable[Floats], colour: str, width: float) -> None:
         """Draw lines (K, 2), mm, as one."""
@@ -134,27 +140,35 @@ class Paper:
         a, b = self.at(low), self.at(high)
         reach = 0.5 * float(np.linalg.norm(b - a))
         if reach < 2.0 * LETTER:
-            x, y = 0.5 * (a + b)
+            (x, y), reach = 0.5 * (a + b), reach + 5.0
             self.parts.append(
-                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{reach + 5.0:.1f}" fill="none" stroke="{colour}" '
-                'stroke-width="1.4"/>'
+                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{reach:.1f}" fill="none" stroke="{colour}" stroke-width="1.4"/>'
             )
+            self.keep((x - reach, y - reach, x + reach, y + reach))
 
     def keep(self, box: Box) -> None:
         """Keep labels off a box: left, upper, right, lower edge."""
         self.taken.append(box)
 
-    def label(self, text: str, places: Sequence[Place], kind: str = "label") -> None:
-        """Write a text at the first of some places where it lies on no other and within the drawing."""
-        boxes = [_box(place, text) for place in places]
-        free = [k for k, box in enumerate(boxes) if self._is_free(box)]
-        best = free[0] if free else min(range(len(boxes)), key=lambda k: self._hidden(boxes[k]))
+    def cross(self, *points: Floats | Sequence[float]) -> None:
+        """Keep labels off the line through places (2,), in units of the drawing."""
+        line = np.asarray(points, dtype=np.float64)
+        self.strokes += [line[k : k + 2] for k in range(len(line) - 1)]
+
+    def label(self, text: str, places: Sequence[Place], kind: str = "label") -> Box:
+        """Write a text at the first of some places where it is within the drawing, on no other text and on no line.
+
+        Returns its box.
+        """
+        boxes = [box_of(place, text) for place in places]
+        best = min(range(len(boxes)), key=lambda k: self._hidden(boxes[k]))
         (x, y, anchor), box = places[best], boxes[best]
         self.keep(box)
         self.parts.append(
             f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}" font-size="{LETTER:g}" text-anchor="{anchor}" '
             f'fill="currentColor" style="{_HALO}">{escape(text)}</text>'
         )
+        return box
 
     def label_at(self, point: Floats, text: str) -> None:
         """Write a text beside a point, mm: on the left first, since dimensions lead to the right and down."""
@@ -165,7 +179,11 @@ class Paper:
             (x + side, y + off, "start"), (x - side, y + side + LETTER, "end"), (x + side, y + side + LETTER, "start"),
             (x, y - 12.0, "middle"), (x, y + 12.0 + LETTER, "middle"),
         ]  # fmt: skip
-        self.label(text, [*near, *((a, b + step, c) for step in (-26.0, 26.0, -52.0, 52.0) for a, b, c in near)])
+        far = [(a + out * (a - x), b + step, c) for step in STEPS for out in (0.0, 2.0, 5.0) for a, b, c in near]
+        left, upper, right, lower = self.label(text, [*near, *far])
+        a, b = np.clip(x, left, right), np.clip(y, upper, lower)
+        if np.hypot(a - x, b - y) > FAR:
+            self.stroke(f"M{x:.1f} {y:.1f}L{a:.1f} {b:.1f}", 0.4)
 
     def spot(self, point: Floats, text: str, colour: str) -> None:
         """Draw a point with its name."""
@@ -192,11 +210,15 @@ class Paper:
             return
         (x, y), (dx, dy) = self.at(point), length * along * (1.0, -1.0)
         self.stroke(f"M{x:.1f} {y:.1f}L{x + dx:.1f} {y + dy:.1f}", 1.2)
+        self.cross((x, y), (x + dx, y + dy))
         self.parts.append(arrow_head(x + dx, y + dy, dx, dy))
         ux, uy = dx / (reach * length), dy / (reach * length)
+        ahead = [(far, 0.0) for far in (9.0, 16.0, 24.0)]
+        beside = [(far, side) for far in (0.0, 9.0, 18.0) for side in (-9.0, 9.0)]
         places = [
-            (x + dx + far * ux, y + dy + far * uy + 0.36 * LETTER, "middle") for far in (9.0, 16.0, 24.0)
-        ]  # fmt: skip
+            (x + dx + far * ux - side * uy, y + dy + far * uy + side * ux + 0.36 * LETTER, "middle")
+            for far, side in ahead + beside
+        ]
         self.label(text, places)
 
     def across(self, start: Floats, end: Floats, text: str, ends: tuple[str, str] | None = None) -> None:
@@ -204,14 +226,16 @@ class Paper:
         (ax, ay), (bx, by) = sorted((self.at(start).tolist(), self.at(end).tolist()))
         y = self.height - self.rooms.below + 20.0
         self.stroke(f"M{ax:.1f} {ay + 3:.1f}V{y + 3:.1f}M{bx:.1f} {by + 3:.1f}V{y + 3:.1f}", 0.5)
+        for a, b in ((ax, ay), (bx, by)):
+            self.cross((a, b + 3.0), (a, y + 3.0))
         self._measure((ax, y), (bx, y))
         middle, beside, out = 0.5 * (ax + bx), y + 0.36 * LETTER, 2.5 * ARROW
-        within: list[Place] = [(middle, y - 4.0, "middle")] if _wide(text) + 8.0 < bx - ax else []
+        within: list[Place] = [(middle, y - 4.0, "middle")] if width_of(text) + 8.0 < bx - ax else []
         self.label(text, [*within, (bx + out, beside, "start"), (ax - out, beside, "end"),
                           (middle, y + 1.3 * LETTER, "middle")], "dimension")  # fmt: skip
         if ends is not None:
             for there, x, anchor in ((ends[0], ax, "end"), (ends[1], bx, "start")):
-                inside = max(0.5 * _wide(there) + 2.0, x)
+                inside = max(0.5 * width_of(there) + 2.0, x)
                 places: list[Place] = [(inside, y + 1.4 * LETTER, "middle"), (x, y + 1.4 * LETTER, anchor)]
                 self.label(there, [*places, (inside, y + 2.4 * LETTER, "middle")], "coordinate")
 
@@ -220,6 +244,8 @@ class Paper:
         (ax, ay), (bx, by) = sorted((self.at(start).tolist(), self.at(end).tolist()), key=lambda p: -p[1])
         x = self.width - self.rooms.right + 12.0
         self.stroke(f"M{ax + 3:.1f} {ay:.1f}H{x + 3:.1f}M{bx + 3:.1f} {by:.1f}H{x + 3:.1f}", 0.5)
+        for a, b in ((ax, ay), (bx, by)):
+            self.cross((a + 3.0, b), (x + 3.0, b))
         self._measure((x, ay), (x, by))
         side, off = x + 5.0, 0.36 * LETTER
         middle = 0.5 * (ay + by) + off
@@ -258,31 +284,8 @@ class Paper:
             f'<path d="{path}" {pen} {more}>{inner}</path>' if inner else f'<path d="{path}" {pen} {more}/>'
         )
 
-    def _is_free(self, box: Box) -> bool:
-        inside = box[0] >= 1.0 and box[1] >= 0.0 and box[2] <= self.width - 1.0 and box[3] <= self.height
-        return inside and all(_common(box, other) <= 0.0 for other in self.taken)
-
     def _hidden(self, box: Box) -> float:
         frame = (0.0, 0.0, self.width, self.height)
-        return sum(_common(box, other) for other in self.taken) + 4.0 * (_size(box) - _common(box, frame))
-
-
-def _box(place: Place, text: str) -> Box:
-    x, y, anchor = place
-    wide = _wide(text)
-    left = x - {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor] * wide
-    return (left, y - 0.85 * LETTER, left + wide, y + 0.25 * LETTER)
-
-
-def _wide(text: str) -> float:
-    return LETTER_WIDTH * LETTER * len(text)
-
-
-def _size(box: Box) -> float:
-    return (box[2] - box[0]) * (box[3] - box[1])
-
-
-def _common(a: Box, b: Box) -> float:
-    """Return the area that two boxes have in common."""
-    wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
-    return max(wide, 0.0) * max(high, 0.0)
+        lined = through(box, np.array(self.strokes)) if self.strokes else 0.0
+        hidden = sum(common(box, other) for other in self.taken) + 4.0 * (size(box) - common(box, frame))
+        return hidden + CROSSED * lined

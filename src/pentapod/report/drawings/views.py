@@ -152,15 +152,15 @@ def _along_lean(run: PlannedRun) -> View:
 
 def _draw_machine(paper: Paper, view: View, bones: _Bones) -> None:
     """Draw base, legs, spindle and tool."""
-    paper.line(view.flat(bones.rim), QUIET_COLOUR, 0.8)
+    paper.bar(view.flat(bones.rim), QUIET_COLOUR, 0.8)
     for line in bones.limb:
-        paper.line(view.flat(line), QUIET_COLOUR, 2.0)
+        paper.bar(view.flat(line), QUIET_COLOUR, 2.0)
     for k, leg in enumerate(np.stack([bones.base, bones.joints], axis=1)):
-        paper.line(view.flat(leg), leg_colour(k), 1.8)
+        paper.bar(view.flat(leg), leg_colour(k), 1.8)
     for k, foot in zip(*bones.arms, strict=True):
-        paper.line(view.flat(np.stack([bones.joints[k], foot])), leg_colour(k), 1.4)
-    paper.line(view.flat(np.stack([bones.nose, bones.top])), QUIET_COLOUR, 4.0)
-    paper.line(view.flat(np.stack([bones.tip, bones.nose])), "currentColor", 1.6)
+        paper.bar(view.flat(np.stack([bones.joints[k], foot])), leg_colour(k), 1.4)
+    paper.bar(view.flat(np.stack([bones.nose, bones.top])), QUIET_COLOUR, 4.0)
+    paper.bar(view.flat(np.stack([bones.tip, bones.nose])), "currentColor", 1.6)
     for k, joint in enumerate(bones.base):
         paper.ball(view.flat(joint), str(k + 1), leg_colour(k))
 
@@ -208,7 +208,7 @@ def _levels(paper: Paper, run: PlannedRun, view: View) -> None:
     level = float(view.flat(np.array([0.0, 0.0, height]))[1])
     ends = np.array([[paper.low[0], level], [paper.high[0], level]])
     dashes = 'stroke-dasharray="4 3"' if run.table is None else ""
-    paper.line(ends, "currentColor", 1.0 if run.table is None else 1.8, dashes)
+    paper.bar(ends, "currentColor", 1.0 if run.table is None else 1.8, dashes)
     text = f"{'part down to' if run.table is None else 'table'} z {words_of(1e3 * height)}"
     x, y = paper.at(ends[0])
     paper.label(text, [(x, y + 13.0, "start"), (x, y - 5.0, "start")])
@@ -257,7 +257,7 @@ def _rest(paper: Paper, run: PlannedRun, view: View, part: Outline) -> None:
     low = part.low[1] if run.table is None else float(view.flat(np.array([0.0, 0.0, run.table]))[1])
     left, right = part.low[0], part.high[0]
     if not run.stand.is_tilted:
-        paper.line(np.array([[left, low], [right, low]]), "currentColor", 1.8)
+        paper.bar(np.array([[left, low], [right, low]]), "currentColor", 1.8)
         return
     # It leans to the right, so that its underside falls to the right.
     rise = float(np.tan(run.stand.lean)) * (right - left)
