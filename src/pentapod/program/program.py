@@ -23,6 +23,8 @@ FORMAT_VERSION = 1
 GRAVITY = "gravity"
 COMPENSATIONS = (GRAVITY,)
 """Loads to which legs yield and which the drives can make good."""
+PROCESS = "process"
+"""Asks for compensation of gravity, and of the machine's cutting force against the motion on cuts."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from pentapod.machine.parts import ControllerSettings, ToolLimits
 from pentapod.mesh.io.load import load_mesh
 from pentapod.mesh.mesh import Mesh
 from pentapod.program.commands import can_compensate
-from pentapod.program.program import GRAVITY
+from pentapod.program.program import GRAVITY, PROCESS
 from pentapod.toolpath.axis.orientation import Orientation
 from pentapod.toolpath.gouge.report import GougeOptions
 from pentapod.toolpath.strategies.registry import STRATEGIES
@@ -25,9 +25,6 @@ from pentapod.toolpath.strategies.registry import STRATEGIES
 LARGEST_TOLERANCE = 0.1
 """Largest tolerance that makes sense, as a share of the part's largest extent."""
 
-
-PROCESS = "process"
-"""Asks for compensation of gravity and of the cutting force."""
 
 SLACK = 1e-6
 """Metres by which the stock may be smaller than the part, for rounding."""

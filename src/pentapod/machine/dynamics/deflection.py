@@ -76,11 +76,14 @@ def loaded_poses(machine: Machine, counted: Floats, branch: Branch) -> tuple[Flo
     return position, direction
 
 
-def leg_pushes(machine: Machine, position: Floats, direction: Floats, rates: Floats, accelerations: Floats) -> Floats:
+def leg_pushes(
+    machine: Machine, position: Floats, direction: Floats, rates: Floats, accelerations: Floats, *, weight: bool = True
+) -> Floats:
     """Return the forces (N, n_legs) with which legs hold and move platform and rods, newtons; a push is positive.
 
-    rates, accelerations: of the legs, m/s and m/s². What a drive needs to move itself is not in it: that does not go
-    through the leg. No friction.
+    rates, accelerations: of the legs, m/s and m/s². weight: whether it is in them; else only what moves. What a drive
+    needs to move itself is not in it: that does not go through the leg. No friction.
     """
     terms = Dynamics.of(machine).of_rows(position, direction, rates, accelerations, reach=False)
-    return terms.quadratic + terms.weight - machine.drives.moving_mass * accelerations
+    through = terms.quadratic + terms.weight if weight else terms.quadratic
+    return through - machine.drives.moving_mass * accelerations

@@ -18,8 +18,11 @@ from pentapod.verify.replay.row_forces import RowForces
 SPEED_COLOUR = "#296cb8"
 
 
-def plots_of(packed: Packed, signals: Signals, machine: Machine) -> dict[str, Any]:
-    """Add the arrays of the plots to the page's and return the rest."""
+def plots_of(packed: Packed, signals: Signals, machine: Machine, *, compensated: bool) -> dict[str, Any]:
+    """Add the arrays of the plots to the page's and return the rest.
+
+    compensated: whether drives make good what the legs yield to weight.
+    """
     limits, times, buckets = machine.legs, signals.times, DETAIL.buckets
     legs = [Curve(f"leg {k + 1}", leg_colour(k)) for k in range(signals.legs.shape[1])]
     period = float(times[-1]) / max(len(times) - 1, 1)
@@ -41,7 +44,7 @@ def plots_of(packed: Packed, signals: Signals, machine: Machine) -> dict[str, An
         ends = np.unique([-peak, peak]).tolist()
         rows.append(Row("leg forces, N", extremes(push, buckets), legs, ends, grouped=True))
     if machine.stiffness.given and machine.ends_on_line:
-        push = leg_pushes(machine, *poses, signals.rates, signals.accelerations)
+        push = leg_pushes(machine, *poses, signals.rates, signals.accelerations, weight=not compensated)
         found = Yielding.of(machine, *poses, push)
         alone = 1e6 * np.linalg.norm(found.shift, axis=1)
         cut = alone + 1e6 * machine.cutting_force * found.softest * signals.cutting
