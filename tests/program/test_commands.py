@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from page_arrays import page_arrays, page_data
-from pentapod.base.errors import InputError, JobError, MachineError
+from pentapod.base.errors import InputError, JobError, MachineError, ProgramError
 from pentapod.cli.commands.new import dome_stl
 from pentapod.cli.main import run
 from pentapod.geometry import RigidTransform
@@ -284,3 +284,19 @@ def test_legs_keep_their_limits_where_what_is_made_good_moves_them_too(soft_job,
     for order, limit in ((2, limits.max_acceleration), (3, limits.max_jerk)):
         assert (np.abs(np.diff(told, order, axis=0)) / program.period**order <= 1.001 * limit).all()
     assert "the legs keep below their limits" in (out / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("newtons", "cuts", "compensation"),
+    [
+        (40.0, ((5, 5),), "gravity"),
+        (40.0, (), "gravity"),
+        (40.0, ((5, 60),), "gravity"),
+        (-3.0, ((5, 8),), "gravity"),
+        (np.nan, ((5, 8),), "gravity"),
+        (40.0, ((5, 8),), ""),
+    ],
+)
+def test_a_program_has_no_process_force_that_its_file_could_not_say(newtons, cuts, compensation):
+    with pytest.raises(ProgramError):
+        program_of(MACHINES["springs"], compensation, ProcessForce(newtons, cuts))
