@@ -117,6 +117,6 @@ def test_progress_in_a_file_is_a_line_every_few_seconds():
     now[0] += LINE_EVERY_S
     told("verify", 0.8)
     assert lines == [
-        "toolpath, 5 s so far", "verify 25 %, about 15 s left: between the rows", "verify 26 %, 15 s so far: material",
+        "toolpath, 5 s so far", "verify 25 %, about 18 s left: between the rows", "verify 26 %, 16 s so far: material",
         "verify 80 %, about 5 s left",
-    ], "a time left that grows is not told"  # fmt: skip
+    ], "a stage begins where the one before was last heard of; a time left that grows is not told"  # fmt: skip
