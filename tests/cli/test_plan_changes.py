@@ -20,6 +20,8 @@ def test_other_values_are_planned_and_their_job_is_kept(make_job, tmp_path, caps
     assert run(["verify", str(out / "program.csv"), "--job", str(out / "changed-job.toml"), "-q"]) == 0
     assert run(["verify", str(out / "program.csv"), "--job", str(job)]) == 1
     assert "FAIL  job" in capsys.readouterr().out
+    assert run(["plan", str(out / "changed-job.toml"), "-o", str(out), "-q"]) == 0
+    assert Job.load(out / "changed-job.toml").digest == changed.digest, "planned again it stays"
     assert run(["plan", str(job), "-o", str(out), "-q"]) == 0
     assert not (out / "changed-job.toml").exists(), "the run is not of those values any more"
 

@@ -1,12 +1,14 @@
 """Commands of drives that make good what legs yield to weight: made, undone, judged, refused where nothing is known."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pentapod.base.errors import InputError, JobError, MachineError
+from page_arrays import page_arrays, page_data
+from pentapod.base.errors import InputError, JobError, MachineError, ProgramError
 from pentapod.cli.commands.new import dome_stl
 from pentapod.cli.main import run
 from pentapod.geometry import RigidTransform
@@ -178,6 +180,12 @@ def soft_job(tmp_path_factory):
 def test_a_job_is_compensated_by_itself_and_its_posted_rows_are_judged(soft_job, tmp_path, capsys):
     program = read_csv(soft_job / "out" / "program.csv")
     assert program.provenance.compensation == "gravity"
+    # What is left is in the report as the verdict says it.
+    text = (soft_job / "out" / "report.html").read_text(encoding="utf-8")
+    (row,) = (each for each in page_data(text)["plots"]["rows"] if each["title"].startswith("deflection of the tip"))
+    claims = json.loads((soft_job / "out" / "verdict.json").read_text(encoding="utf-8"))["certificates"]
+    (left,) = (1e3 * each["value"] for each in claims if each["claim"] == "deflection")
+    assert page_arrays(text)[row["array"]].max() == pytest.approx(left, rel=0.02)  # the report's accelerations
     posted = tmp_path / "posted"
     assert run(["post", str(soft_job / "out" / "program.csv"), "--to", "csv", "-o", str(posted), "-q"]) == 0
     (file,) = posted.glob("*.csv")
@@ -207,6 +215,11 @@ def test_a_job_is_compensated_by_itself_and_its_posted_rows_are_judged(soft_job,
     (tmp_path / "part.stl").write_bytes((soft_job / "part.stl").read_bytes())
     assert run(["verify", str(file), "--job", str(job)]) == 1
     assert "a leg model, stiffness or weight of another machine" in capsys.readouterr().out
+    # Nor are commands made by springs that no verdict knows.
+    planned, late = str(soft_job / "out" / "program.csv"), tmp_path / "late"
+    assert run(["post", planned, "--to", "pvt", "-o", str(late), "--job", str(job)]) == 2
+    assert "stiffness or masses were changed after the verdict" in capsys.readouterr().err
+    assert not late.exists()
 
 
 def test_strokes_hold_for_what_drives_are_told(soft_job, tmp_path):
@@ -271,3 +284,19 @@ def test_legs_keep_their_limits_where_what_is_made_good_moves_them_too(soft_job,
     for order, limit in ((2, limits.max_acceleration), (3, limits.max_jerk)):
         assert (np.abs(np.diff(told, order, axis=0)) / program.period**order <= 1.001 * limit).all()
     assert "the legs keep below their limits" in (out / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("newtons", "cuts", "compensation"),
+    [
+        (40.0, ((5, 5),), "gravity"),
+        (40.0, (), "gravity"),
+        (40.0, ((5, 60),), "gravity"),
+        (-3.0, ((5, 8),), "gravity"),
+        (np.nan, ((5, 8),), "gravity"),
+        (40.0, ((5, 8),), ""),
+    ],
+)
+def test_a_program_has_no_process_force_that_its_file_could_not_say(newtons, cuts, compensation):
+    with pytest.raises(ProgramError):
+        program_of(MACHINES["springs"], compensation, ProcessForce(newtons, cuts))

@@ -21,6 +21,7 @@ NOT_ASKED = {
     "legs, spindle and tool clear of the surroundings",  # one claim where nobody told what is there
     "component as asked",
     "process data",
+    "compensation as asked",
     "every cut is made in one set-up",
 }
 FEEDS = {"feed on cuts", "feed on links", "rapid rate"}

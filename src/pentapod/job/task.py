@@ -15,7 +15,7 @@ from pentapod.job.build.limits import placement_limits
 from pentapod.job.build.placed_check import Ranges, meetings, refusal_of
 from pentapod.job.build.placement import job_weights
 from pentapod.job.build.toolpath import drops_gouges
-from pentapod.job.build.values import PROCESS, is_compensated
+from pentapod.job.build.values import is_compensated
 from pentapod.job.plan_before import PlanBefore
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import INTERRUPTED, StageRunner
@@ -30,7 +30,7 @@ from pentapod.planning.problem.constraints import FREE
 from pentapod.program import Program, Provenance, sample, write_csv
 from pentapod.program.commands import compensation_sentence
 from pentapod.program.process import with_process, with_process_force
-from pentapod.program.program import GRAVITY
+from pentapod.program.program import GRAVITY, PROCESS
 from pentapod.timing import Explanation, JerkOptions, Limit, Trajectory, certify, explain, retime, slow_cuts
 from pentapod.timing.jerk.options import DEFAULTS
 from pentapod.timing.reuse import retime_as_before

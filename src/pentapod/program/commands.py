@@ -19,6 +19,7 @@ from pentapod.base.errors import InputError, MachineError
 from pentapod.kinematics.forces import leg_force_map
 from pentapod.machine.calibration.digest import digest_of
 from pentapod.machine.dynamics.deflection import weight_yields
+from pentapod.machine.leg_model import LegModel
 from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
 from pentapod.program.header import COMPENSATION, CUT_ROWS, PROCESS_FORCE
@@ -51,6 +52,8 @@ each metre that a length is off, so that 3.2 / 6 of it, or less, comes back as f
 MOST_OF_IT = 0.97
 """Share of a process force below which it is told how much of it is made good."""
 
+NO_LEG_MODEL = LegModel()
+
 ROWS_AT_ONCE = 1 << 15
 """Rows that are computed together, which bounds the memory."""
 
@@ -62,7 +65,7 @@ def compensation_sentence(program: Program, machine: Machine) -> str:
     most = 1e6 * float(np.abs(springs(program, program.machine(machine), program.legs)).max())
     process = ""
     if (force := program.process_force) is not None:
-        made = np.linalg.norm(_forces(program, program.machine(machine), program.legs), axis=1)[_cutting(program)]
+        made = np.linalg.norm(_forces(program, program.machine(machine), program.legs), axis=1)[cutting_rows(program)]
         share = float(np.median(made)) / force.newtons
         # Told where it is not nearly all: what is slow, or yields far, is not pushed back in full.
         part = "" if share > MOST_OF_IT else f"{share:.0%} (the feed is too low, or legs yield too far, for all) of "
@@ -156,7 +159,7 @@ def _forces(program: Program, machine: Machine, legs: Floats) -> Floats:
     process = program.process_force
     if process is None:
         return np.empty((0, 3))
-    cutting = _cutting(program)
+    cutting = cutting_rows(program)
     tips, yields = np.empty((len(legs), 3)), 0.0
     for part in blocks(len(legs), ROWS_AT_ONCE):
         position, direction = machine.robot.pose(legs[part], program.component)
@@ -177,12 +180,19 @@ def _forces(program: Program, machine: Machine, legs: Floats) -> Floats:
     return force
 
 
-def _cutting(program: Program) -> Bools:
+def cutting_rows(program: Program) -> Bools:
     """Return the rows (N,) on which a program's process force acts."""
     cutting = np.zeros(len(program.legs), dtype=np.bool_)
     for first, last in () if program.process_force is None else program.process_force.cuts:
         cutting[first : last + 1] = True
     return cutting
+
+
+def springs_digest(program: Program, machine: Machine) -> str:
+    """Return 16 hexadecimal digits over the stiffness and the masses by which drives make good; "" for nothing."""
+    if not program.provenance.compensation:
+        return ""
+    return commands_digest(replace(program, process_force=None), replace(machine, leg_model=NO_LEG_MODEL))
 
 
 def commands_digest(program: Program, machine: Machine) -> str:

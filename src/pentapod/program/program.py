@@ -23,6 +23,8 @@ FORMAT_VERSION = 1
 GRAVITY = "gravity"
 COMPENSATIONS = (GRAVITY,)
 """Loads to which legs yield and which the drives can make good."""
+PROCESS = "process"
+"""Asks for compensation of gravity, and of the machine's cutting force against the motion on cuts."""
 
 
 @dataclass(frozen=True)
@@ -114,9 +116,12 @@ class Program(Result):
         if rows != sorted(set(rows)) or (rows and not 0 <= rows[0] <= rows[-1] < len(self.legs)):
             raise ProgramError("switches must be in the order of their rows", key="switches", value=rows[:8])
         if self.process_force is not None:
-            flat = [row for pair in self.process_force.cuts for row in pair]
-            if flat != sorted(flat) or (flat and not 0 <= flat[0] <= flat[-1] < len(self.legs)):
+            flat, newtons = [row for pair in self.process_force.cuts for row in pair], self.process_force.newtons
+            if not flat or flat != sorted(set(flat)) or not 0 <= flat[0] <= flat[-1] < len(self.legs):
                 raise ProgramError("cuts must be in the order of their rows", key="cut_rows", value=flat[:8])
+            if not (0.0 < newtons < np.inf and self.provenance.compensation):
+                what = "a process force is a positive number, of a program that is compensated for gravity, too"
+                raise ProgramError(what, key="process_force_n", value=newtons)
         if self.legs.ndim != 2 or len(self.legs) < 2:
             raise ProgramError("a program needs at least two rows", value=self.legs.shape)
         if not (np.isfinite(self.period) and self.period > 0.0):

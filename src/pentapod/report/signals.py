@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pentapod.base.arrays import Floats, Ints, set_frozen
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
-from pentapod.machine.dynamics.deflection import Yielding
+from pentapod.machine.dynamics.deflection import Yielding, leg_pushes
 from pentapod.machine.machine import Machine
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.limits.margins import Margins
@@ -134,8 +134,8 @@ def _deflections(
     """Return how far the tip deflects at the rows (N, 2): see `Signals`."""
     if not machine.yielding_known:
         return None
-    made_good = bool(program.provenance.compensation)
-    found = Yielding.moving(machine, poses, joined.first, joined.second, made_good=made_good)
+    push = leg_pushes(machine, *poses, joined.first, joined.second, weight=not program.provenance.compensation)
+    found = Yielding.of(machine, *poses, push)
     by_masses = np.linalg.norm(found.shift, axis=1)
     return np.column_stack([by_masses + machine.cutting_force * found.softest * cuts, by_masses])
 

@@ -16,7 +16,7 @@ from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import stage
 from pentapod.machine.machine import Machine
 from pentapod.numerics.threads import in_threads
-from pentapod.program.commands import read_back
+from pentapod.program.commands import read_back, springs_digest
 from pentapod.program.csv import read_csv
 from pentapod.program.program import Program
 from pentapod.toolpath.toolpath import Toolpath
@@ -151,7 +151,7 @@ def judged(
         elif strict:
             read.append(claim.inapplicable(answer))
     progress("verify", 1.0)
-    return Verdict(tuple(read), tuple(unjudged), sources)
+    return Verdict(tuple(read), tuple(unjudged), sources, springs_digest(program, specification.machine))
 
 
 def _answers(replay: Replay, claims: Sequence[Claim]) -> Iterator[Certificate | Idle]:

@@ -291,11 +291,10 @@ def test_the_command_refuses(tmp_path, capsys):
     (tmp_path / "plan.npz").write_bytes(b"PK nonsense")
     assert run(["post", source, "--to", "apt", "-o", str(out)]) == 2
     assert "plan.npz" in capsys.readouterr().err
-    # The run says which machine it is for. With its name alone, what has no use for the toolpath does not look at it.
-    assert run(["post", source, "--to", "pvt", "-o", str(tmp_path / "elsewhere")]) == 2
+    # It names the job, and that the machine, whose screws and springs count; who names the machine does without.
+    assert run(["post", source, "--to", "pvt", "-o", str(out)]) == 2
     assert "plan.npz" in capsys.readouterr().err
-    named = ["--machine", program.provenance.machine]
-    assert run(["post", source, "--to", "pvt", "-o", str(tmp_path / "elsewhere"), *named]) == 0
+    assert run(["post", source, "--to", "pvt", "--machine", "desk", "-o", str(tmp_path / "elsewhere")]) == 0
     assert capsys.readouterr().err == ""
     (tmp_path / "plan.npz").unlink()
     stranger = dataclasses.replace(program.provenance, machine="shed", machine_digest="0")

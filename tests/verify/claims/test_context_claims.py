@@ -9,9 +9,10 @@ import replay_cases as cases
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics import Component
 from pentapod.planning.problem.constraints import PlacementConstraints
+from pentapod.program.program import ProcessForce
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.verify import verify
-from pentapod.verify.claims.provenance import component, controller
+from pentapod.verify.claims.provenance import compensation, component, controller
 from pentapod.verify.claims.set_up import placement, whole
 
 PLACED = RigidTransform(np.diag([1.0, -1.0, -1.0]), np.array([0.01, -0.02, 0.3]))
@@ -123,3 +124,42 @@ def test_pieces_only_where_the_job_allows_them(cubic):
     assert whole(cases.replay_of(cubic, half, setups=2)).unknown
     assert whole(cases.replay_of(cubic, half, setups=2, missed=0)).passed
     assert not whole(cases.replay_of(cubic, half, setups=2, missed=1)).passed
+
+
+def cuts_of(replay):
+    """First and last row of each run of rows that are on a cut for certain."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], replay.cuts(), [False]]).astype(int)))
+    return tuple((int(first), int(end) - 1) for first, end in edges.reshape(-1, 2))
+
+
+@pytest.mark.parametrize(
+    ("asked", "own", "newtons", "shift", "passed"),
+    [
+        ("", "gravity", 0.0, 0, False),
+        ("gravity", "", 0.0, 0, False),
+        ("gravity", "gravity", 0.0, 0, True),
+        ("gravity", "gravity", 30.0, 0, False),
+        ("process", "", 0.0, 0, False),
+        ("process", "gravity", 0.0, 0, False),
+        ("process", "gravity", 30.0, 0, True),
+        ("process", "gravity", 31.0, 0, False),
+        ("process", "gravity", 30.0, 150, False),
+        ("process", "gravity", 30.0, -150, False),
+    ],
+)
+def test_drives_make_good_what_the_job_asks_for_on_its_cuts(cubic, asked, own, newtons, shift, passed):
+    plain = cases.replay_of(cubic)
+    cuts = cuts_of(plain)
+    assert len(cuts) == 2
+    force = ProcessForce(newtons, tuple((a + shift, b + shift) for a, b in cuts)) if newtons else None
+    source = replace(plain.program.provenance, compensation=own)
+    program = replace(plain.program, provenance=source, process_force=force)
+    machine = replace(plain.machine, cutting_force=30.0)
+    replay = cases.same_motion(plain, machine=machine, compensation=asked)
+    found = compensation(replace(replay, program=program))
+    assert found.passed is passed, found.method
+
+
+def test_compensation_that_nobody_asks_for_or_about_is_idle(cubic):
+    for asked in (None, ""):
+        assert not hasattr(compensation(cases.replay_of(cubic, compensation=asked)), "passed")

@@ -7,6 +7,8 @@ import pytest
 import replay_cases as cases
 
 from pentapod.machine import Dynamics, Stiffness
+from pentapod.program.commands import commanded
+from pentapod.program.program import ProcessForce
 from pentapod.verify import CLAIMS
 from pentapod.verify.replay.claim import Idle
 
@@ -61,6 +63,44 @@ def test_a_cutting_force_counts_on_cuts_in_the_softest_direction(case):
     assert 1e-3 * found.value == pytest.approx(expected.max())
     assert found.where.row == int(expected.argmax())
     assert "10 N in any direction" in found.method
+
+
+def compensated(replay, force=None):
+    """The replay of the same rows with a header that says what drives make good."""
+    source = replace(replay.program.provenance, compensation="gravity")
+    return replace(replay, program=replace(replay.program, provenance=source, process_force=force))
+
+
+def test_what_drives_make_good_of_the_weight_is_not_counted(case):
+    replay = elastic(case)
+    machine = replace(replay.machine, masses=replace(replay.machine.masses, gravity=np.zeros(3)))
+    weightless = claimed(cases.same_motion(replay, machine=machine))
+    found = claimed(compensated(replay))
+    assert found.value == pytest.approx(weightless.value, rel=1e-9)
+    assert "weight and acceleration" not in found.method
+
+
+def test_a_process_force_that_drives_make_good_counts_where_nothing_is_cut(case):
+    """The drives push against it by the rows of the header, whatever the tool does there."""
+    replay, last = elastic(case, cutting=10.0), len(case.program.legs) - 1
+    cuts = np.flatnonzero(replay.cuts())
+    right, everywhere = ProcessForce(10.0, ((int(cuts[0]), int(cuts[-1])),)), ProcessForce(200.0, ((0, last),))
+    usual, found = claimed(compensated(replay, right)), claimed(compensated(replay, everywhere))
+    assert "10 N against the motion on cuts" in usual.method
+    assert "any direction" not in usual.method
+    # Told to make good 200 N, the drives move the tip by twenty times as much as 10 N against its motion do.
+    told = commanded(compensated(replay, everywhere).program, replay.machine).legs
+    more = told - commanded(compensated(replay).program, replay.machine).legs
+    (p, i), robot, tool = (each[::2] for each in replay.pose), replay.machine.robot, replay.machine.tool_length
+    at, along = robot.pose(robot.leg_lengths(p, i) + more, case.program.component)
+    moved = np.linalg.norm(at + tool * along - p - tool * i, axis=1)
+    assert found.value > 0.9e3 * moved.max()
+    assert found.value > 2.0 * usual.value
+    assert not claimed(replace(compensated(replay, everywhere), specification=bounded(replay, usual.value))).passed
+
+
+def bounded(replay, value_mm):
+    return replace(replay.specification, deflection=1e-3 * value_mm * 1.01)
 
 
 def test_machines_without_a_stiffness_are_not_judged(case):

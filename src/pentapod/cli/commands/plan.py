@@ -138,8 +138,9 @@ def _planned(path: Path, asked: Asked) -> tuple[int, dict[str, Any] | None]:
             raise
         click.echo(f"error: {error}", err=True)  # at once: the search takes as long as a plan or two
         return _advised(job, options, as_json=asked.as_json, quiet=asked.quiet)
-    if not asked.changes:
-        (asked.out / CHANGED_JOB).unlink(missing_ok=True)  # of the run before
+    of_before = asked.out / CHANGED_JOB
+    if not asked.changes and of_before.is_file() and not of_before.samefile(path):
+        of_before.unlink()
     return shown(outcome, asked.out, explain=asked.explain, as_json=asked.as_json, quiet=asked.quiet)
 
 

@@ -67,9 +67,9 @@ def post(
 ) -> int:
     """Write PROGRAM.csv in another format, if a verdict has passed for exactly this file.
 
-    The machine is the shipped one that the program names, or that of the run in PROGRAM's folder. Where the program
-    stands alone, name another one, or one with another tool or period, by --job or --machine. Installed packages add
-    formats by entry points of the group pentapod.posts.
+    The machine is that of the run in PROGRAM's folder, by its job, else the shipped one that the program names. Where
+    the program stands alone, name another one, or one with another tool or period, by --job or --machine. Installed
+    packages add formats by entry points of the group pentapod.posts.
 
     If the machine has a park pose, the rows begin and end there: way_in.csv, PROGRAM.csv and way_out.csv as one. With
     --from they are planned anew from the last waypoint passed at that time; it is refused where no way in is clear.

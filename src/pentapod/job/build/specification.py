@@ -14,6 +14,7 @@ from pentapod.job.build.placement import job_constraints
 from pentapod.job.build.region import covers_region, job_region
 from pentapod.job.build.tool import job_tool
 from pentapod.job.build.toolpath import job_depth, job_options, job_toolpath, tool_in_world
+from pentapod.job.build.values import is_compensated
 from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import Component
 from pentapod.machine.clearance.collision_world import CollisionWorld
@@ -21,6 +22,7 @@ from pentapod.machine.machine import Machine
 from pentapod.machine.reader import calibration_bytes, machine_bytes
 from pentapod.mesh.io.load import load_mesh
 from pentapod.mesh.mesh import Mesh
+from pentapod.program.program import GRAVITY, PROCESS
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify import Coverage, Cutting, Specification
@@ -52,6 +54,7 @@ def job_specification(
         cutting=cutting,
         constraints=constraints,
         component=None if component is None else Component.parse(component),
+        compensation=_compensation(job, machine),
         deflection=job.tolerance.si.deflection,
         lowest_share=job.feed.lowest_share,
         stop_angle=job.feed.si.stop_angle,
@@ -59,6 +62,13 @@ def job_specification(
         waived=job.verify.waive,
         sources=_sources(job, own_machine=own_machine),
     )
+
+
+def _compensation(job: Job, machine: Machine) -> str:
+    """Return what drives must make good of what legs yield to, as a specification says it."""
+    if not is_compensated(job, machine):
+        return ""
+    return PROCESS if job.output.compensation == PROCESS else GRAVITY
 
 
 def job_collision_world(job: Job, machine: Machine, mesh: Mesh) -> CollisionWorld:

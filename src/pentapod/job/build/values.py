@@ -24,9 +24,6 @@ LARGEST_TOLERANCE = 0.1
 """Largest tolerance that makes sense, as a share of the part's largest extent."""
 
 
-PROCESS = "process"
-"""Asks for compensation of gravity and of the cutting force."""
-
 SLACK = 1e-6
 """Metres by which the stock may be smaller than the part, for rounding."""
 
@@ -65,7 +62,7 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
         what = "how far the tip deflects is not known on this machine"
         raise job.error("tolerance", "deflection_mm", what, value=deflection, remedy=remedy)
     asked = job.output.compensation
-    if asked == PROCESS and not cutting > 0.0:
+    if asked == "process" and not cutting > 0.0:
         what, remedy = "there is no process force to make good", "give feed.cutting_force_n, or ask for gravity alone"
         raise job.error("output", "compensation", what, remedy=remedy)
     if asked not in (None, "none") and not machine.yielding_known:

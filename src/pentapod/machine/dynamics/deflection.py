@@ -46,20 +46,6 @@ class Yielding(Value):
             np.where(firm[:, None], shift, np.inf), np.where(firm, np.maximum(most[:, -1], 0.0), np.inf), ways[..., -1]
         )
 
-    @classmethod
-    def moving(
-        cls, machine: Machine, poses: tuple[Floats, Floats], rates: Floats, accelerations: Floats, *, made_good: bool
-    ) -> Yielding:
-        """Return it for legs that move so, m/s and m/s² (N, n_legs), in poses (N, 3), by the machine's masses.
-
-        made_good: whether drives are told what the legs yield by the weight at rest; then that is not in it.
-        """
-        push = leg_pushes(machine, *poses, rates, accelerations)
-        if made_good:
-            still = np.zeros_like(rates)
-            push -= leg_pushes(machine, *poses, still, still)
-        return cls.of(machine, *poses, push)
-
 
 def tip_shift(machine: Machine, position: Floats, direction: Floats, shorter: Floats) -> Floats:
     """Return how far the tip moves (N, 3), metres, to first order, as legs get shorter (N, n_legs), metres."""
@@ -90,11 +76,14 @@ def loaded_poses(machine: Machine, counted: Floats, branch: Branch) -> tuple[Flo
     return position, direction
 
 
-def leg_pushes(machine: Machine, position: Floats, direction: Floats, rates: Floats, accelerations: Floats) -> Floats:
+def leg_pushes(
+    machine: Machine, position: Floats, direction: Floats, rates: Floats, accelerations: Floats, *, weight: bool = True
+) -> Floats:
     """Return the forces (N, n_legs) with which legs hold and move platform and rods, newtons; a push is positive.
 
-    rates, accelerations: of the legs, m/s and m/s². What a drive needs to move itself is not in it: that does not go
-    through the leg. No friction.
+    rates, accelerations: of the legs, m/s and m/s². weight: whether it is in them; else only what moves. What a drive
+    needs to move itself is not in it: that does not go through the leg. No friction.
     """
     terms = Dynamics.of(machine).of_rows(position, direction, rates, accelerations, reach=False)
-    return terms.quadratic + terms.weight - machine.drives.moving_mass * accelerations
+    through = terms.quadratic + terms.weight if weight else terms.quadratic
+    return through - machine.drives.moving_mass * accelerations

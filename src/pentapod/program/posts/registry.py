@@ -11,7 +11,7 @@ from pentapod.base.errors import InputError
 from pentapod.base.registry import Registry
 from pentapod.base.values import Value
 from pentapod.machine.machine import Machine
-from pentapod.program.commands import commanded, commands_digest, read_back
+from pentapod.program.commands import commanded, commands_digest, read_back, springs_digest
 from pentapod.program.csv import csv_bytes
 from pentapod.program.posts.files import write_files
 from pentapod.program.posts.verified import VerdictContent, check_passed, marked_unverified
@@ -121,8 +121,9 @@ def write_post(
         if verdict is None:
             remedy = "name the verdict.json of the program, or insist with unverified=True"
             raise InputError("there is no verdict on this program", key="verdict", remedy=remedy)
-        check_passed(verdict, given.sha256 or sha256(csv_bytes(given.program)).hexdigest())
-    program = given.program if post.takes_toolpath or post.readings else commanded(given.program, given.machine)
+        springs = "" if given.machine is None else springs_digest(given.program, given.machine)
+        check_passed(verdict, given.sha256 or sha256(csv_bytes(given.program)).hexdigest(), springs=springs)
+    program = _rows(given, post)
     if LASER_POWER in post.loses:
         program = replace(program, laser_power=None)
     source = replace(program.provenance, unverified=unverified)
@@ -130,6 +131,21 @@ def write_post(
     if unverified:
         contents = {relative: marked_unverified(relative, content) for relative, content in contents.items()}
     return write_files(contents, folder)
+
+
+def _rows(given: PostInput, post: Post) -> Program:
+    """Return the program with the rows that a post writes.
+
+    Raises InputError where they depend on the machine, and it is missing or not that of the program.
+    """
+    program, machine = given.program, given.machine
+    if post.takes_toolpath:  # it asks for the machine by itself
+        return program
+    if program.provenance.compensation or (machine is not None and machine.leg_model.is_needed):
+        machine = given.the_machine()
+    if post.readings:
+        return program if machine is None else read_back(program, machine)
+    return commanded(program, machine)
 
 
 def read_post(folder: str | Path, name: str, machine: Machine | None = None) -> Program | Toolpath:

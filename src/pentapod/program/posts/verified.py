@@ -23,10 +23,11 @@ _ARCHIVES = (".npz", ".h5")
 """Their header begins with the mark."""
 
 
-def check_passed(verdict: VerdictContent, sha256: str, program: str | Path | None = None) -> None:
+def check_passed(verdict: VerdictContent, sha256: str, program: str | Path | None = None, springs: str = "") -> None:
     """Raise ProgramError unless a verdict has passed for the program file with this SHA-256.
 
-    program: the file's name, for the message.
+    program: the file's name, for the message. springs: digest of the stiffness and the masses by which it will be
+    compensated; those that were judged must be the same.
     """
     content = verdict if isinstance(verdict, Mapping) else _content(Path(verdict), program)
     if content.get("passed") is not True:
@@ -39,6 +40,11 @@ def check_passed(verdict: VerdictContent, sha256: str, program: str | Path | Non
         raise ProgramError(
             "the verdict is about another file: the program was changed, or replaced", file=program,
             value=f"SHA-256 {sha256[:12]}…", expected=f"{str(judged)[:12]}…", remedy=_REMEDY,
+        )  # fmt: skip
+    if springs and (before := content.get("springs", springs)) != springs:
+        raise ProgramError(
+            "the machine's stiffness or masses were changed after the verdict: drives would be told other lengths",
+            file=program, key="springs", value=springs, expected=before, remedy=_REMEDY,
         )  # fmt: skip
 
 

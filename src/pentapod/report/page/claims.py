@@ -32,6 +32,7 @@ _BY_BEGINNING = (
         ),
     ),
     (5, ("readable", "machine", "controller", "job", "placement", "component as asked", "process data")),
+    (5, ("compensation as asked",)),
 )  # fmt: skip
 """Kind of a claim by how its name begins; the first that fits."""
 

@@ -54,11 +54,11 @@ def write_report(outcome: Outcome, path: str | Path) -> Path:
 def contents(run: ReportedRun) -> tuple[dict[str, Any], Packed, dict[str, Any]]:
     """Return what the page's script draws, the arrays for it, and the variables of the template."""
     packed = Packed()
-    motion = run.motion(packed)
+    motion, signals = run.motion(packed), run.signals
     page = {
-        "scene": scene_of(packed, run.outcome, run.signals, run.machine),
+        "scene": scene_of(packed, run.outcome, signals, run.machine),
         "motion": motion,
-        "plots": None if run.signals is None else plots_of(packed, run.signals, run.machine),
+        "plots": None if signals is None else plots_of(packed, signals, run.machine),
     }
     return page, packed, _context(run, motion)
 

@@ -43,7 +43,11 @@ def _parts(replay: Replay) -> str:
 
 
 def deflection(replay: Replay) -> Finding | Idle:
-    """Judge how far the tip moves at the rows because the legs yield: to masses, and on cuts to the cutting force."""
+    """Judge how far the tip moves at the rows because the legs yield: to masses, and on cuts to the cutting force.
+
+    What drives make good of the weight is not counted. A force against the motion that they make good counts as one
+    that may be missing: where nothing is cut they move the tip.
+    """
     machine, bound = replay.machine, replay.specification.deflection
     if not machine.stiffness.given:
         return Idle("the machine says nothing of the stiffness of its legs", unknown=bound is not None)
@@ -51,17 +55,21 @@ def deflection(replay: Replay) -> Finding | Idle:
         return Idle("forces in legs are known only where all end on the tool's line", unknown=bound is not None)
     found, force = replay.yielding, machine.cutting_force
     by_masses = np.linalg.norm(found.shift, axis=1)
-    by_cutting = force * found.softest * replay.cuts() if force else np.zeros_like(by_masses)
+    by_cutting = np.maximum(force * found.softest * replay.cuts(), replay.pushed) if force else replay.pushed
     total = by_masses + by_cutting
     row = int(total.argmax())
     shift, way, value = found.shift[row], found.ways[row], float(total[row])
     way = shift + by_cutting[row] * (way if shift @ way >= 0.0 else -way)
     told = ", ".join(f"{x:+.2f}" for x in way / max(float(np.linalg.norm(way)), float(np.finfo(float).tiny)))
+    masses = "weight and acceleration" if replay.made_good is None else "acceleration"
+    process = replay.program.process_force
+    cutting = f"{force:g} N in any direction on cuts"
+    if process is not None:
+        cutting = f"{process.newtons:g} N against the motion on cuts: drives make it good, and move the tip without it"
     method = (
-        f"springs of legs and joints, first order, at the rows: {1e6 * by_masses[row]:.3g} µm by weight and "
-        f"acceleration there, {1e6 * by_cutting[row]:.3g} µm at most by {force:g} N in any direction on cuts; "
-        f"towards about ({told}) in the machine's frame; weight and acceleration alone move it by "
-        f"{1e6 * by_masses.min():.3g} to {1e6 * by_masses.max():.3g} µm"
+        f"springs of legs and joints, first order, at the rows: {1e6 * by_masses[row]:.3g} µm by {masses} there, "
+        f"{1e6 * by_cutting[row]:.3g} µm at most by {cutting}; towards about ({told}) in the machine's frame; "
+        f"{masses} alone: {1e6 * by_masses.min():.3g} to {1e6 * by_masses.max():.3g} µm"
     )
     if replay.made_good is not None:
         most = 1e6 * float(replay.sag.max())

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Bools, Floats
 from pentapod.geometry.polyline import arc_length
+from pentapod.program.commands import cutting_rows
+from pentapod.program.program import GRAVITY, PROCESS
 from pentapod.toolpath.process import laser_power
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
@@ -84,6 +86,38 @@ def controller(replay: Replay) -> Finding:
     return Finding.without_value(passed, method)
 
 
+def compensation(replay: Replay) -> Finding | Idle:
+    """Judge that drives make good what is asked, by the header; idle where nothing is asked, or neither has any.
+
+    Rows nearer to the end of a cut than the path may be from the toolpath, and a row more, may count either way.
+    """
+    asked, program, force = replay.specification.compensation, replay.program, replay.program.process_force
+    own, told = program.provenance.compensation, cutting_rows(program)
+    if asked is None or not (asked or own):
+        return Idle("nothing is asked for, or neither the job nor the header asks for it")
+    newtons = 0.0 if force is None else force.newtons
+    wanted = replay.machine.cutting_force if asked == PROCESS else 0.0
+    method = f"header: drives make good {_loads(own, newtons)}; asked for: {_loads(asked and GRAVITY, wanted)}"
+    if own != (asked and GRAVITY) or (force is not None and newtons != wanted):
+        return Finding.without_value(False, method)
+    wrong = (_inside(replay.cuts()) & ~told) | (_inside(replay.off_cuts()) & told)
+    if asked == PROCESS and wrong.any():
+        where = replay.place(2 * int(wrong.argmax()))
+        return Finding.without_value(False, f"{method}; the rows of cuts are not those of the toolpath", where)
+    return Finding.without_value(True, method)
+
+
+def _loads(compensation: str, newtons: float) -> str:
+    """Return what drives make good, in words."""
+    return (compensation or "nothing") + (f", and {newtons:g} N against the motion on cuts" if newtons else "")
+
+
+def _inside(rows: Bools) -> Bools:
+    """Return those rows (N,) whose neighbours are among them, too."""
+    wide = np.pad(rows, 1, mode="edge")
+    return wide[:-2] & rows & wide[2:]
+
+
 def process(replay: Replay) -> Finding | Idle:
     """Judge that spindle, coolant, tool and laser are switched as the toolpath says, and where; idle where none is.
 
@@ -136,4 +170,5 @@ CLAIMS = (
     Claim("job", job, needs_pose=False),
     Claim("component as asked", component, needs_pose=False),
     Claim("process data", process),
+    Claim("compensation as asked", compensation),
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +14,7 @@ from pentapod.base.values import Value
 from pentapod.geometry.interpolant import clamped_slopes
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.machine.dynamics.deflection import Yielding, tip_shift
+from pentapod.machine.dynamics.deflection import Yielding, leg_pushes, tip_shift
 from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
 from pentapod.program.commands import springs
@@ -155,26 +155,48 @@ class Replay(Value):
         (position, direction), found = (pose[::2] for pose in self.pose), list[Yielding]()
         for part, rates, accelerations in motion_of_rows(self.program, self.slopes):
             poses = position[part], direction[part]
-            made_good = self.made_good is not None
-            found.append(Yielding.moving(self.machine, poses, rates, accelerations, made_good=made_good))
+            push = leg_pushes(self.machine, *poses, rates, accelerations, weight=self.made_good is None)
+            found.append(Yielding.of(self.machine, *poses, push))
         return Yielding(*(np.concatenate([getattr(each, name) for each in found]) for name in vars(found[0])))
 
     @cached_property
     def sag(self) -> Floats:
         """How far the tip (N,) would move at the rows by what drives make good, metres; 0 where that is nothing."""
+        return self._moved(self.made_good)
+
+    @cached_property
+    def pushed(self) -> Floats:
+        """How far the tip (N,) is moved at the rows by what drives make good of a process force, where there is none.
+
+        Metres; 0 where that is nothing.
+        """
+        if self.made_good is None or self.program.process_force is None:
+            return self._moved(None)
+        steady = replace(self.program, process_force=None)
+        return self._moved(self.made_good - springs(steady, self.machine, steady.legs))
+
+    def _moved(self, more: Floats | None) -> Floats:
+        """Return how far the tip (N,) moves at the rows as legs get shorter by `more` (N, n_legs), metres."""
         (position, direction), found = (pose[::2] for pose in self.pose), np.zeros(len(self.program.legs))
-        if (more := self.made_good) is not None:
-            for part in blocks(len(found), ROWS_AT_ONCE):
+        for part in blocks(0 if more is None else len(found), ROWS_AT_ONCE):
+            if more is not None:
                 shift = tip_shift(self.machine, position[part], direction[part], more[part])
                 found[part] = np.linalg.norm(shift, axis=1)
         return found
 
     def cuts(self) -> Bools:
         """Return the rows (N,) on a cut and farther than the path tolerance from its ends."""
+        return self._on(cut=True)
+
+    def off_cuts(self) -> Bools:
+        """Return the rows (N,) on a link or rapid and farther than the path tolerance from its ends."""
+        return self._on(cut=False)
+
+    def _on(self, *, cut: bool) -> Bools:
         arcs, ends = self.match.arcs[::2], arc_length(self.toolpath.tilt_centres)[self.toolpath.starts]
         first = np.searchsorted(ends, arcs - self.match_radius, side="right")
         behind = np.searchsorted(ends, arcs + self.match_radius, side="left")
-        kinds = [segment.kind is SegmentKind.CUT for segment in self.toolpath.segments]
+        kinds = [(segment.kind is SegmentKind.CUT) is cut for segment in self.toolpath.segments]
         return np.array([False, *kinds, False])[first] & (first == behind)
 
     def place(self, sample: float) -> Place:

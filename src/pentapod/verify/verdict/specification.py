@@ -28,7 +28,9 @@ class Specification(Value):
     angle in radians of the cone about the nominal axis in which the tool may tilt; axis_tolerance: radians beyond that;
     path_tolerance: metres. job_digest: of the job that the header must name. collision_world: what legs, spindle and
     tool must not touch. cutting: what cuts, and into which part. constraints: the allowed placements. component: in
-    which the program must be; None where any is allowed. deflection: largest of the tip, metres; None where it is only
+    which the program must be; None where any is allowed. compensation: what drives must make good of what legs yield
+    to, "gravity", "process" (gravity, and the machine's cutting force against the motion on cuts) or "" for nothing;
+    None where any is allowed. deflection: largest of the tip, metres; None where it is only
     told. lowest_share: of the feed, that cuts and links must reach where no limit is used; None for the default of the
     tool, 0 for no lowest feed. stop_angle: radians; where the toolpath turns by more the program may stop, as it may
     from 20 degrees on. setups: largest number of programs into which the job may be split; missed: number of intervals
@@ -47,6 +49,7 @@ class Specification(Value):
     cutting: Cutting | None = None
     constraints: PlacementConstraints | None = None
     component: Component | None = None
+    compensation: str | None = None
     deflection: float | None = None
     lowest_share: float | None = None
     stop_angle: float | None = None
@@ -79,6 +82,7 @@ class Asked(TypedDict, total=False):
     cutting: Cutting | None
     constraints: PlacementConstraints | None
     component: Component | None
+    compensation: str | None
     deflection: float | None
     lowest_share: float | None
     stop_angle: float | None

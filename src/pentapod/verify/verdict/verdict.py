@@ -109,6 +109,8 @@ class NotJudged(Value):
 class Verdict(Result):
     """All certificates of a program, the claims that were not judged, and the files that it is about.
 
+    springs: digest of the stiffness and the masses by which the program is compensated; "" where it is not.
+
     >>> [claim.claim for claim in verdict.certificates if not claim.passed]
     []
     """
@@ -118,6 +120,7 @@ class Verdict(Result):
     certificates: tuple[Certificate, ...]
     not_judged: tuple[NotJudged, ...] = ()
     sources: Sources = NO_SOURCES
+    springs: str = ""
 
     @property
     def passed(self) -> bool:
@@ -172,6 +175,7 @@ class Verdict(Result):
             "certificates": [asdict(c) for c in self.certificates],
             "not_judged": [asdict(entry) for entry in self.not_judged],
             "sha256": self.sources.to_dict(),
+            **({"springs": self.springs} if self.springs else {}),
             "judged_by": {
                 "pentapod": __version__,
                 "libraries": library_versions(),
