@@ -1,4 +1,4 @@
-"""Commands of drives that make good what legs yield to weight: made, undone, judged, refused where nothing is known."""
+"""Commands that compensate for what legs yield to weight: made, undone, judged, refused where nothing is known."""
 
 import json
 from dataclasses import replace
@@ -133,7 +133,7 @@ def test_commands_are_undone_where_the_tool_is_slow_and_yields_far(stiffness, ne
     assert np.abs(read_back(told, machine).legs - legs).max() < 2.5 * QUANTUM, "two last digits"
     said = compensation_sentence(program, machine)
     assert f"{newtons:g} N against the motion on cuts" in said
-    # What cannot be made good at this speed is told.
+    # What cannot be compensated for at this speed is told.
     assert ("legs yield too far" in said) == (newtons / stiffness > 3e-6)
 
 
@@ -195,7 +195,7 @@ def test_a_job_is_compensated_by_itself_and_its_posted_rows_are_judged(soft_job,
     assert run(["verify", str(file), "--job", str(soft_job / "job.toml"), "--json"]) == 0
     said = capsys.readouterr().out
     assert "the rows are what drives are told" in said
-    assert "drives make good the weight" in said
+    assert "drives compensate for the weight" in said
     # Both files, the program and what was posted of it, say where the tip is.
     tips = list[np.ndarray]()
     for each in (soft_job / "out" / "program.csv", file):

@@ -1,4 +1,4 @@
-"""Deflection of the tip, and what drives leave of it that make it good, against MuJoCo with springs for legs."""
+"""Deflection of the tip, and what drives leave of it that compensate for it, against MuJoCo with springs for legs."""
 
 import numpy as np
 import pytest

@@ -39,7 +39,7 @@ class MendOptions:
     is never exceeded. places: beginnings of the names of claims about places that may be left out. slow: claims that a
     better time law keeps; law: options of the search for it. apart: claims that a leg path nearer to the toolpath
     keeps; closer: its share of the tolerances. loaded: claims that a time law within less than the legs' limits keeps,
-    since drives are told more than the legs' own motion where they make good what these yield; gentler: its share.
+    since drives are told more than the legs' own motion where they compensate for what these yield; gentler: its share.
     """
 
     rounds: int = 3

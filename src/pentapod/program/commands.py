@@ -50,7 +50,7 @@ each metre that a length is off, so that 3.2 / 6 of it, or less, comes back as f
 """
 
 MOST_OF_IT = 0.97
-"""Share of a process force below which it is told how much of it is made good."""
+"""Share of a process force below which it is told how much of it is compensated for."""
 
 NO_LEG_MODEL = LegModel()
 
@@ -59,7 +59,7 @@ ROWS_AT_ONCE = 1 << 15
 
 
 def compensation_sentence(program: Program, machine: Machine) -> str:
-    """Return what drives make good, and by how much their lengths differ from the program's; "" for nothing."""
+    """Return what drives compensate for, and by how much their lengths differ from the program's; "" for nothing."""
     if not program.provenance.compensation:
         return ""
     most = 1e6 * float(np.abs(springs(program, program.machine(machine), program.legs)).max())
@@ -70,7 +70,9 @@ def compensation_sentence(program: Program, machine: Machine) -> str:
         # Told where it is not nearly all: what is slow, or yields far, is not pushed back in full.
         part = "" if share > MOST_OF_IT else f"{share:.0%} (the feed is too low, or legs yield too far, for all) of "
         process = f" and {part}{force.newtons:g} N against the motion on cuts"
-    return f"posts make good what the legs yield to weight{process}: drives are told up to {most:.3g} um more or less"
+    return (
+        f"posts compensate for what the legs yield to weight{process}: drives are told up to {most:.3g} um more or less"
+    )
 
 
 def commanded(program: Program, machine: Machine | None) -> Program:
@@ -189,7 +191,7 @@ def cutting_rows(program: Program) -> Bools:
 
 
 def springs_digest(program: Program, machine: Machine) -> str:
-    """Return 16 hexadecimal digits over the stiffness and the masses by which drives make good; "" for nothing."""
+    """Return 16 hexadecimal digits over the stiffness and the masses by which drives compensate; "" for nothing."""
     if not program.provenance.compensation:
         return ""
     return commands_digest(replace(program, process_force=None), replace(machine, leg_model=NO_LEG_MODEL))

@@ -43,7 +43,7 @@ COMPENSATION = "compensation"
 """Key of programs with which drives are told more than the lengths of the legs, because legs yield to their loads."""
 PROCESS_FORCE, CUT_ROWS = "process_force_n", "cut_rows"
 FORCE_KEYS = (PROCESS_FORCE, CUT_ROWS)
-"""Keys of programs with which drives make good a force against the motion, too: newtons, and the rows of the cuts."""
+"""Keys of programs that compensate for a force against the motion, too: newtons, and the rows of the cuts."""
 COMMANDS = "commands"
 """Key of files in which the rows are what drives are told, by a machine's leg model, and what its legs yield."""
 LEFT_OUT = "left_out"

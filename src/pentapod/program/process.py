@@ -14,7 +14,7 @@ from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 
 
 def with_process_force(program: Program, trajectory: Trajectory, toolpath: Toolpath, newtons: float) -> Program:
-    """Return a program whose drives make good a force against the motion on the cuts of its toolpath."""
+    """Return a program whose drives compensate for a force against the motion on the cuts of its toolpath."""
     kinds = np.array([segment.kind is SegmentKind.CUT for segment in toolpath.segments])
     cutting = kinds[np.asarray(trajectory.segment(program.times[:-1] + 0.5 * program.period))]
     edges = np.flatnonzero(np.diff(np.concatenate([[False], cutting, [False]])))

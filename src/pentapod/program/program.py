@@ -22,7 +22,7 @@ from pentapod.toolpath.linking.partition import Piece
 FORMAT_VERSION = 1
 GRAVITY = "gravity"
 COMPENSATIONS = (GRAVITY,)
-"""Loads to which legs yield and which the drives can make good."""
+"""Loads to which legs yield and for which the drives can compensate."""
 PROCESS = "process"
 """Asks for compensation of gravity, and of the machine's cutting force against the motion on cuts."""
 
@@ -88,8 +88,8 @@ class Program(Result):
     rows, "linear", or "cubic": the C2 cubic spline with zero end velocities. component: in which the motion must stay.
     placement: workpiece → machine. rail_positions: of the guides of a reconfigurable machine, metres; None for others.
     switches: spindle, coolant and tool, in the order of their rows. laser_power (N,): share of the laser's full power
-    from each row to the next; None where nothing says it. process_force: that drives make good beside the weight; None
-    for none.
+    from each row to the next; None where nothing says it. process_force: beside the weight, for which drives compensate;
+    None for none.
 
     >>> program.legs.shape[1], round(program.duration, 1) == round(trajectory.duration, 1)
     (5, True)

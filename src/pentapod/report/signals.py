@@ -51,7 +51,7 @@ class Signals:
     (N,). causes (N,): the active limit, index into `cause_names`. margins (K, M) at rows
     `margin_rows` (K,), with those to obstacles. forces: of the drives; None where they have no limit.
     deflections (N, 2): of the tip with the cutting force in the worst direction on cuts, and by masses alone, metres;
-    what drives make good is not in them. None where they are not known.
+    what drives compensate for is not in them. None where they are not known.
     """
 
     times: Floats

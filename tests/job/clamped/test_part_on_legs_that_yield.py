@@ -24,7 +24,7 @@ SPRING = 5e6
 
 @pytest.mark.parametrize(("compensation", "least", "most"), [(None, 0.0, 1e-7), ("none", 10e-6, 1e-3)])
 def test_touches_are_taken_as_the_program_will_be_played(tmp_path, compensation, least, most) -> None:
-    """Commands that make good the weight bring the tip to its place, so touches must say where the part truly is."""
+    """Commands that compensate for the weight bring the tip to its place: touches must say where the part truly is."""
     (tmp_path / "part.stl").write_bytes(dome_stl(cells=16))
     (tmp_path / "job.toml").write_text(job_text(), encoding="utf-8")
     job, desk = Job.load(tmp_path / "job.toml"), Machine.load("desk")

@@ -66,7 +66,7 @@ def test_a_cutting_force_counts_on_cuts_in_the_softest_direction(case):
 
 
 def compensated(replay, force=None):
-    """The replay of the same rows with a header that says what drives make good."""
+    """The replay of the same rows with a header that says what drives compensate for."""
     source = replace(replay.program.provenance, compensation="gravity")
     return replace(replay, program=replace(replay.program, provenance=source, process_force=force))
 
@@ -88,7 +88,7 @@ def test_a_process_force_that_drives_make_good_counts_where_nothing_is_cut(case)
     usual, found = claimed(compensated(replay, right)), claimed(compensated(replay, everywhere))
     assert "10 N against the motion on cuts" in usual.method
     assert "any direction" not in usual.method
-    # Told to make good 200 N, the drives move the tip by twenty times as much as 10 N against its motion do.
+    # Told to compensate for 200 N, the drives move the tip by twenty times as much as 10 N against its motion do.
     told = commanded(compensated(replay, everywhere).program, replay.machine).legs
     more = told - commanded(compensated(replay).program, replay.machine).legs
     (p, i), robot, tool = (each[::2] for each in replay.pose), replay.machine.robot, replay.machine.tool_length

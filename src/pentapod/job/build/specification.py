@@ -65,7 +65,7 @@ def job_specification(
 
 
 def _compensation(job: Job, machine: Machine) -> str:
-    """Return what drives must make good of what legs yield to, as a specification says it."""
+    """Return the loads that drives must compensate for, as a specification says it."""
     if not is_compensated(job, machine):
         return ""
     return PROCESS if job.output.compensation == PROCESS else GRAVITY

@@ -63,7 +63,10 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
         raise job.error("tolerance", "deflection_mm", what, value=deflection, remedy=remedy)
     asked = job.output.compensation
     if asked == "process" and not cutting > 0.0:
-        what, remedy = "there is no process force to make good", "give feed.cutting_force_n, or ask for gravity alone"
+        what, remedy = (
+            "there is no process force to compensate for",
+            "give feed.cutting_force_n, or ask for gravity alone",
+        )
         raise job.error("output", "compensation", what, remedy=remedy)
     if asked not in (None, "none") and not machine.yielding_known:
         remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
@@ -78,7 +81,7 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
 
 
 def is_compensated(job: Job, machine: Machine) -> bool:
-    """Return whether drives make good how far legs yield by weights, by their commands; machine: that of the job."""
+    """Return whether drives compensate for what legs yield to weight; machine: that of the job."""
     return job.output.compensation != "none" and machine.yielding_known
 
 

@@ -187,8 +187,8 @@ class OutputKeys:
         Literal["none", "gravity", "process"] | None,
         Key(
             "",
-            "what drives make good because legs yield to it: gravity, or gravity and feed.cutting_force_n against the "
-            "motion on cuts (process); gravity when left out, on machines that give the stiffness of their legs",
+            "loads that drives compensate for, because legs yield to them: gravity, or gravity and "
+            "feed.cutting_force_n against the motion on cuts (process); gravity when left out, on machines that give the stiffness of their legs",
         ),
     ] = None
 

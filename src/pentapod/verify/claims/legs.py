@@ -11,7 +11,7 @@ from pentapod.verify.replay.replay import Replay
 from pentapod.verify.verdict.verdict import Place
 
 _EXACT = "exact extreme values of the controller's polynomials, at the rows and between them"
-_TOLD = "; of the lengths that drives are told, which make good what the legs yield"
+_TOLD = "; of the lengths that drives are told, which compensate for what the legs yield"
 
 
 def shortest(replay: Replay) -> Finding:

@@ -45,8 +45,8 @@ def _parts(replay: Replay) -> str:
 def deflection(replay: Replay) -> Finding | Idle:
     """Judge how far the tip moves at the rows because the legs yield: to masses, and on cuts to the cutting force.
 
-    What drives make good of the weight is not counted. A force against the motion that they make good counts as one
-    that may be missing: where nothing is cut they move the tip.
+    The weight that drives compensate for is not counted. A force against the motion for which they compensate counts
+    as one that may be missing: where nothing is cut they move the tip.
     """
     machine, bound = replay.machine, replay.specification.deflection
     if not machine.stiffness.given:
@@ -65,7 +65,9 @@ def deflection(replay: Replay) -> Finding | Idle:
     process = replay.program.process_force
     cutting = f"{force:g} N in any direction on cuts"
     if process is not None:
-        cutting = f"{process.newtons:g} N against the motion on cuts: drives make it good, and move the tip without it"
+        cutting = (
+            f"{process.newtons:g} N against the motion on cuts: drives compensate for it, and move the tip without it"
+        )
     method = (
         f"springs of legs and joints, first order, at the rows: {1e6 * by_masses[row]:.3g} µm by {masses} there, "
         f"{1e6 * by_cutting[row]:.3g} µm at most by {cutting}; towards about ({told}) in the machine's frame; "
@@ -74,7 +76,7 @@ def deflection(replay: Replay) -> Finding | Idle:
     if replay.made_good is not None:
         most = 1e6 * float(replay.sag.max())
         method += (
-            f"; drives make good the weight{_process(replay)}, which moves the tip by up to {most:.3g} µm: legs "
+            f"; drives compensate for the weight{_process(replay)}, which moves the tip by up to {most:.3g} µm: legs "
             f"that are {SOFTER:.0%} softer than the machine says leave {most * SOFTER / (1.0 - SOFTER):.3g} µm of it"
         )
     if bound is None:

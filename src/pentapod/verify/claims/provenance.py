@@ -87,7 +87,7 @@ def controller(replay: Replay) -> Finding:
 
 
 def compensation(replay: Replay) -> Finding | Idle:
-    """Judge that drives make good what is asked, by the header; idle where nothing is asked, or neither has any.
+    """Judge that drives compensate for what is asked, by the header; idle where nothing is asked, or neither has any.
 
     Rows nearer to the end of a cut than the path may be from the toolpath, and a row more, may count either way.
     """
@@ -97,7 +97,7 @@ def compensation(replay: Replay) -> Finding | Idle:
         return Idle("nothing is asked for, or neither the job nor the header asks for it")
     newtons = 0.0 if force is None else force.newtons
     wanted = replay.machine.cutting_force if asked == PROCESS else 0.0
-    method = f"header: drives make good {_loads(own, newtons)}; asked for: {_loads(asked and GRAVITY, wanted)}"
+    method = f"header: drives compensate for {_loads(own, newtons)}; asked for: {_loads(asked and GRAVITY, wanted)}"
     if own != (asked and GRAVITY) or (force is not None and newtons != wanted):
         return Finding.without_value(False, method)
     wrong = (_inside(replay.cuts()) & ~told) | (_inside(replay.off_cuts()) & told)
@@ -108,7 +108,7 @@ def compensation(replay: Replay) -> Finding | Idle:
 
 
 def _loads(compensation: str, newtons: float) -> str:
-    """Return what drives make good, in words."""
+    """Return what drives compensate for, in words."""
     return (compensation or "nothing") + (f", and {newtons:g} N against the motion on cuts" if newtons else "")
 
 

@@ -150,7 +150,7 @@ class Replay(Value):
     def yielding(self) -> Yielding:
         """How far the tip moves at the rows because the legs yield to masses. Needs a pose at every row.
 
-        What drives make good is not in it.
+        What drives compensate for is not in it.
         """
         (position, direction), found = (pose[::2] for pose in self.pose), list[Yielding]()
         for part, rates, accelerations in motion_of_rows(self.program, self.slopes):
@@ -161,12 +161,12 @@ class Replay(Value):
 
     @cached_property
     def sag(self) -> Floats:
-        """How far the tip (N,) would move at the rows by what drives make good, metres; 0 where that is nothing."""
+        """How far loads for which drives compensate would move the tip (N,) at the rows, metres; 0 for none."""
         return self._moved(self.made_good)
 
     @cached_property
     def pushed(self) -> Floats:
-        """How far the tip (N,) is moved at the rows by what drives make good of a process force, where there is none.
+        """How far the tip (N,) is moved at the rows by a process force that drives compensate for, where there is none.
 
         Metres; 0 where that is nothing.
         """

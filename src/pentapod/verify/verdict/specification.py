@@ -28,8 +28,8 @@ class Specification(Value):
     angle in radians of the cone about the nominal axis in which the tool may tilt; axis_tolerance: radians beyond that;
     path_tolerance: metres. job_digest: of the job that the header must name. collision_world: what legs, spindle and
     tool must not touch. cutting: what cuts, and into which part. constraints: the allowed placements. component: in
-    which the program must be; None where any is allowed. compensation: what drives must make good of what legs yield
-    to, "gravity", "process" (gravity, and the machine's cutting force against the motion on cuts) or "" for nothing;
+    which the program must be; None where any is allowed. compensation: the loads that drives must compensate
+    for, "gravity", "process" (gravity, and the machine's cutting force against the motion on cuts) or "" for nothing;
     None where any is allowed. deflection: largest of the tip, metres; None where it is only
     told. lowest_share: of the feed, that cuts and links must reach where no limit is used; None for the default of the
     tool, 0 for no lowest feed. stop_angle: radians; where the toolpath turns by more the program may stop, as it may

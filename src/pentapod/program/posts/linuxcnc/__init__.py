@@ -17,7 +17,8 @@ from pentapod.toolpath.toolpath import Toolpath
 __all__ = ["LINUXCNC", "kinematics", "player", "stream", "trivkins"]
 
 NOT_COMPENSATED = (
-    "The other three folders make good what the legs yield to their loads. This one does not: the tip moves by that.\n"
+    "The other three folders compensate for what the legs yield to their loads. This one does not: the tip moves by "
+    "that.\n"
 )
 """What is said of the module where the program is compensated."""
 
