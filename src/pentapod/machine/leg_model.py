@@ -13,7 +13,7 @@ finds to rounding. Commands are made where posts are written, and nowhere before
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Annotated
 
 import numpy as np
@@ -120,6 +120,11 @@ class LegModel(Value):
         """16 hexadecimal digits of a SHA-256 over all numbers; "" where commands are readings."""
         numbers = {item.name: getattr(self, item.name) for item in fields(self)}
         return digest_of(numbers) if self.is_needed else ""
+
+    @property
+    def without_backlash(self) -> LegModel:
+        """The same model for single poses, of which nobody knows from which side the drives came."""
+        return replace(self, backlash=np.zeros_like(self.backlash))
 
     @property
     def is_needed(self) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,6 +39,8 @@ from pentapod.machine.parts import (
 if TYPE_CHECKING:
     from pentapod.machine.calibration.record import CalibrationRecord
 
+UPWARDS = np.array([0.0, 0.0, 1.0])
+
 ARCHITECTURAL_LIMIT = 0.005
 """Least `conditioning` of a machine's robot: below it, some motion hardly changes the leg lengths."""
 
@@ -53,8 +55,9 @@ class Machine(Value):
     machine waits. guard: what its controller must leave of its limits. guides: of a reconfigurable machine, on which
     the base joints are set before a program runs; rail_positions (n_legs,) metres: where they stand; `robot` is the
     geometry there. calibration: from which `robot` is the machine as built; None where it is the one that was designed.
-    leg_model: from readings to what drives are told, in posts. limb: the passive limb that holds the platform, where
-    one does.
+    leg_model: from readings to what drives are told, in posts; screws_at (3,): position, tool upright, in which screws
+    count as not turned, whatever the tool: by default the middle of the work volume for the first tool's tip. limb: the
+    passive limb that holds the platform, where one does.
 
     Raises MachineError: the geometry is close to architecturally singular (`ARCHITECTURAL_LIMIT`), or the
     spindle's nose would be above the lowest platform joint.
@@ -88,6 +91,7 @@ class Machine(Value):
     leg_model: LegModel = field(default_factory=LegModel)
     limb: PassiveLimb | None = None
     rail_positions: Floats = field(default_factory=lambda: np.zeros(1))
+    screws_at: Floats | None = None
     architecture: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -97,6 +101,8 @@ class Machine(Value):
         each = {name: for_legs(getattr(self, name), count) for name in parts}
         set_frozen(self, **each)
         self._check_legs()
+        if self.screws_at is None:
+            set_frozen(self, screws_at=self.work.centre - self.tool_length * UPWARDS)
         rails = (
             np.broadcast_to(self.rail_positions, (count,)) if np.size(self.rail_positions) == 1 else self.rail_positions
         )
@@ -197,17 +203,11 @@ class Machine(Value):
 
         branch: signs (2,), or (N, 2) of each row. NaN where readings have no pose in the branch.
         """
-        return self.leg_model.commands(self.robot, legs, branch, self._home)
+        return self.leg_model.commands(self.robot, legs, branch, (cast(Floats, self.screws_at), UPWARDS))
 
     def readings(self, commands: ArrayLike, branch: ArrayLike) -> Floats:
         """Return what the legs read (N, n_legs) where the drives were told `commands`: the inverse of `commands`."""
-        return self.leg_model.readings(self.robot, commands, branch, self._home)
-
-    @property
-    def _home(self) -> tuple[Floats, Floats]:
-        """The pose in which screws count as not turned: the tool upright in the middle of the work volume."""
-        direction = np.array([0.0, 0.0, 1.0])
-        return self.work.centre - self.tool_length * direction, direction
+        return self.leg_model.readings(self.robot, commands, branch, (cast(Floats, self.screws_at), UPWARDS))
 
     def with_tool(self, tool_length: float) -> Machine:
         """Return this machine with another tool: metres from p to the tip. Raises MachineError."""

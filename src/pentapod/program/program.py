@@ -88,8 +88,8 @@ class Program(Result):
     rows, "linear", or "cubic": the C2 cubic spline with zero end velocities. component: in which the motion must stay.
     placement: workpiece → machine. rail_positions: of the guides of a reconfigurable machine, metres; None for others.
     switches: spindle, coolant and tool, in the order of their rows. laser_power (N,): share of the laser's full power
-    from each row to the next; None where nothing says it. process_force: beside the weight, for which drives compensate;
-    None for none.
+    from each row to the next; None where nothing says it. process_force: beside the weight, for which drives
+    compensate; None for none.
 
     >>> program.legs.shape[1], round(program.duration, 1) == round(trajectory.duration, 1)
     (5, True)

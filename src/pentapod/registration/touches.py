@@ -7,13 +7,13 @@
     702.114907,...
 
 The first lines are TOML behind the comment mark. Poses come from the legs by the machine's own forward kinematics, so
-that its calibration applies.
+that its calibration applies; where drives count something else than lengths, its leg model is undone, but for backlash.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 
@@ -87,14 +87,15 @@ class Touches(Value):
         their strokes, without a pose, or with poses in several components.
         """
         try:
-            own = machine.with_tool(self.probe_length)
+            own = replace(machine.with_tool(self.probe_length), leg_model=machine.leg_model.without_backlash)
         except MachineError as error:
             value = float(from_si(self.probe_length, "mm"))
             expected = "from the platform's origin to the end of the tip"
             raise InputError(error.what, file=file, key="probe_length_mm", value=value, expected=expected) from error
         self._check_strokes(own, file)
         branches = own.robot.branches if self.component is None else (self.component,)
-        poses = {branch: own.robot.pose(self.legs, np.array(branch)) for branch in branches}
+        read = {branch: own.readings(self.legs, np.array(branch)) for branch in branches}
+        poses = {branch: own.robot.pose(read[branch], np.array(branch)) for branch in branches}
         if self.component is None:
             fitting = [branch for branch in branches if _within(own, branch, *poses[branch])]
             if len(fitting) != 1:
@@ -106,7 +107,7 @@ class Touches(Value):
             branches = (fitting[0],)
         position, direction = poses[branches[0]]
         if loaded:
-            position, direction = loaded_poses(own, self.legs, branches[0])
+            position, direction = loaded_poses(own, read[branches[0]], branches[0])
         lost = np.flatnonzero(~np.isfinite(position).all(axis=1))
         if len(lost):
             row = int(lost[0])

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from pentapod.base.archives import check_array, read_arrays
+from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal
 from pentapod.base.values import Value
@@ -23,6 +25,7 @@ from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import Component
 from pentapod.machine.clearance.collision_world import CollisionWorld
 from pentapod.machine.dynamics.deflection import weight_yields
+from pentapod.machine.machine import Machine
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.registration.probing import OPTIONS, Probing, plan_probing
 from pentapod.registration.touches import Touches
@@ -73,7 +76,15 @@ def probing_of(folder: str | Path, probe: Probe, count: int, misplaced: float = 
     )
     surface, cut = MeshDistance.of(mesh), cut_surface(job, mesh)
     found = plan_probing(machine, component, surface, placement, cut, world, head, count, misplaced)
-    if isinstance(found, Refusal) or not is_compensated(job, machine):
+    if isinstance(found, Refusal):
         return found
-    poses = machine.robot.pose(found.legs, np.array(component))
-    return replace(found, legs=found.legs + weight_yields(machine, *poses))
+    counted = partial(_counted, machine, np.array(component), loaded=is_compensated(job, machine))
+    ways = tuple(counted(way) for way in found.ways)
+    return replace(found, legs=counted(found.legs), beyond=counted(found.beyond), ways=ways)
+
+
+def _counted(machine: Machine, branch: Ints, legs: Floats, *, loaded: bool) -> Floats:
+    """Return what drives count (N, n) where legs have these lengths. loaded: whether by the weight they yield."""
+    there = replace(machine, leg_model=machine.leg_model.without_backlash)
+    yields = weight_yields(machine, *machine.robot.pose(legs, branch)) if loaded else 0.0
+    return there.commands(legs + yields, branch)

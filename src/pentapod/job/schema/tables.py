@@ -188,7 +188,8 @@ class OutputKeys:
         Key(
             "",
             "loads that drives compensate for, because legs yield to them: gravity, or gravity and "
-            "feed.cutting_force_n against the motion on cuts (process); gravity when left out, on machines that give the stiffness of their legs",
+            "feed.cutting_force_n against the motion on cuts (process); gravity when left out, on machines that give "
+            "the stiffness of their legs",
         ),
     ] = None
 
