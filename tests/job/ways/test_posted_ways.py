@@ -78,6 +78,23 @@ def test_programs_that_do_not_meet_are_not_joined():
         joined(program, program)
 
 
+@pytest.mark.parametrize(("compensation", "tried"), [("", [1.0]), ("gravity", [1.0, 0.97])])
+def test_a_restart_of_a_compensated_program_is_tried_with_gentler_legs(parked, monkeypatch, compensation, tried):
+    """The run may have been mended so: drives are told more than the legs' own motion."""
+    job, out = parked
+    whole, shares = read_csv(out / "program.csv"), []
+    source = replace(whole.provenance, compensation=compensation)
+    monkeypatch.setattr(middle, "read_csv", lambda _: replace(whole, provenance=source))
+
+    def planned(task, *_):
+        shares.append(task.gentler)
+        return Refusal("restart", "a leg is too fast")
+
+    monkeypatch.setattr(middle, "_planned", planned)
+    assert isinstance(restart(job, out / "program.csv", 3.2), Refusal)
+    assert shares == tried
+
+
 def test_a_restart_makes_what_is_left_with_the_same_tool(parked, tmp_path, capsys):
     job, out = parked
     posted(out / "program.csv", "--to", "csv", "-o", tmp_path, "--from", "3.2s", "--quiet")

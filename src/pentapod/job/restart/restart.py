@@ -23,6 +23,7 @@ from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import job_link_style
 from pentapod.job.build.upright import may_stand, upright
 from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.job.mending import OPTIONS as MENDING
 from pentapod.job.plan_before import PlanBefore
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import StageRunner
@@ -34,6 +35,7 @@ from pentapod.job.ways.ways import ways
 from pentapod.job.withheld import withheld
 from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.machine.machine import Machine
+from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.limits.margins import Margins
 from pentapod.program import Program, read_csv
 from pentapod.toolpath import Segment, SegmentKind, Toolpath
@@ -98,6 +100,16 @@ def restart(job: Job, file: Path, seconds: float, progress: Progress = silent) -
     placed = placed_on(toolpath, program, margins, axes)[0]
     limits, runner = timing_limits(job, machine), StageRunner(progress)
     task = Task(job, specification, runner, limits=limits, placed=placed)
+    found = _planned(task, kinds, begins, waypoint)
+    if isinstance(found, Restart) or not program.provenance.compensation:
+        return found
+    # Drives that compensate are told more than the legs' own motion: the run may have been mended so.
+    return _planned(replace(task, gentler=MENDING.gentler), kinds, begins, waypoint)
+
+
+def _planned(task: Task, kinds: tuple[LimitKind, ...], begins: float, waypoint: int) -> Restart | Refusal:
+    """Return the rest of a program by its task, with its ways, if it passes."""
+    specification, limits = task.specification, task.limits
     with tempfile.TemporaryDirectory() as folder:
         left = task.program(Path(folder) / PROGRAM)
         if isinstance(left, Refusal):
@@ -105,13 +117,13 @@ def restart(job: Job, file: Path, seconds: float, progress: Progress = silent) -
         made = ways(left, specification, limits=limits, kinds=kinds)
         if isinstance(made, Refusal):
             return made
-        verdict = judged(Path(folder) / PROGRAM, specification, claims=way_claims(made), progress=progress)
+        verdict = judged(Path(folder) / PROGRAM, specification, claims=way_claims(made), progress=task.runner.progress)
     fails = withheld(verdict)
     if fails is not None or not verdict.passed:
         why = verdict.answer if fails is None else fails.cause
         cause = f"what is left of the program does not pass: from {begins:.3f} s, {why}"
         return Refusal(STAGE, cause, remedy="Choose another time, on a rapid where it can be")
-    return Restart(from_park(left, made), machine, verdict, begins, waypoint)
+    return Restart(from_park(left, made), specification.machine, verdict, begins, waypoint)
 
 
 def _waypoint(program: Program, specification: Specification, seconds: float) -> tuple[int, float]:

@@ -120,7 +120,7 @@ static inline double pentapod_contour_nearest(
     first = (1.0 - fraction) * (1.0 - 2.0 * fraction);
     last = fraction * (2.0 * fraction - 1.0);
     middle = 4.0 * fraction * (1.0 - fraction);
-    pentapod_contour_numbers(pentapod_contour_past(c, at + 2 < PENTAPOD_KEPT ? at + 2 : at + 1), tool_length, before);
+    pentapod_contour_numbers(pentapod_contour_past(c, at + 2), tool_length, before);
     pentapod_contour_numbers(pentapod_contour_past(c, at + 1), tool_length, from);
     pentapod_contour_numbers(pentapod_contour_past(c, at), tool_length, to);
     for (j = 0; j < 6; j++) {
