@@ -1,6 +1,7 @@
 """Commands that compensate for what legs yield to weight: made, undone, judged, refused where nothing is known."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -237,6 +238,18 @@ def test_strokes_hold_for_what_drives_are_told(soft_job, tmp_path):
         file = write_csv(other, tmp_path / "program.csv")
         failed = {each.claim for each in judge(job, file, machine=tight).certificates if not each.passed}
         assert ("legs not too short" in failed) == fails
+
+
+def test_the_set_up_sheet_tells_what_drives_count(soft_job):
+    """At the pose of the first row, as a post tells the drives: not the length, which is micrometres off."""
+    program = read_csv(soft_job / "out" / "program.csv")
+    told = commanded(program, job_machine(Job.load(soft_job / "job.toml")))
+    text = (soft_job / "out" / "sheet.html").read_text(encoding="utf-8")
+    row = re.search(r"<th>start</th><td>[^<]*</td><td>([^<]*)</td>", text)
+    assert row is not None
+    shown = np.array([float(value) for value in row[1].split(",")])
+    assert np.abs(shown - 1e3 * told.legs[0]).max() <= 0.6e-3
+    assert np.abs(shown - 1e3 * program.legs[0]).max() > 2e-3
 
 
 def test_compensation_is_asked_for_in_the_job(make_job):

@@ -61,7 +61,7 @@ class TimeLeft:
     def text(self, now: float, fraction: float) -> str:
         """Return "about 5 s left"; empty where it is not known."""
         seconds = now - self.began
-        known = fraction >= FIRST_SHARE and seconds > 0.0
+        known = FIRST_SHARE <= fraction < 1.0 and seconds > 0.0
         left = seconds * (1.0 - fraction) / fraction if known else float("inf")
         told = left < GROWN * self.least
         self.least = min(left, self.least)

@@ -125,6 +125,20 @@ def readings(program: Program, machine: Machine, commands: Floats) -> Floats:
     return legs
 
 
+def counted(machine: Machine, position: Floats, direction: Floats, *, loaded: bool) -> Floats:
+    """Return what drives count (N, n_legs), metres, where the platform rests in poses (N, 3).
+
+    loaded: whether they compensate for the weight. Of backlash, nobody knows from which side a single pose is reached.
+    """
+    legs = machine.robot.leg_lengths(position, direction)
+    if loaded:
+        legs = legs + weight_yields(machine, position, direction)
+    if not machine.leg_model.is_needed:
+        return legs
+    there = replace(machine, leg_model=machine.leg_model.without_backlash)
+    return there.commands(legs, machine.robot.branch(position, direction))
+
+
 def springs(program: Program, machine: Machine, legs: Floats) -> Floats:
     """Return how much longer legs of these lengths (N, n_legs) are without their loads, metres; 0 for no compensation.
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from pentapod.base.archives import check_array, read_arrays
-from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal
 from pentapod.base.values import Value
@@ -24,9 +22,8 @@ from pentapod.job.plan_arrays import GUIDES, JOB_FILE
 from pentapod.job.schema.job import Job
 from pentapod.kinematics.component import Component
 from pentapod.machine.clearance.collision_world import CollisionWorld
-from pentapod.machine.dynamics.deflection import weight_yields
-from pentapod.machine.machine import Machine
 from pentapod.mesh.query.distance import MeshDistance
+from pentapod.program.commands import counted
 from pentapod.registration.probing import OPTIONS, Probing, plan_probing
 from pentapod.registration.touches import Touches
 
@@ -78,13 +75,9 @@ def probing_of(folder: str | Path, probe: Probe, count: int, misplaced: float = 
     found = plan_probing(machine, component, surface, placement, cut, world, head, count, misplaced)
     if isinstance(found, Refusal):
         return found
-    counted = partial(_counted, machine, np.array(component), loaded=is_compensated(job, machine))
-    ways = tuple(counted(way) for way in found.ways)
-    return replace(found, legs=counted(found.legs), beyond=counted(found.beyond), ways=ways)
-
-
-def _counted(machine: Machine, branch: Ints, legs: Floats, *, loaded: bool) -> Floats:
-    """Return what drives count (N, n) where legs have these lengths. loaded: whether by the weight they yield."""
-    there = replace(machine, leg_model=machine.leg_model.without_backlash)
-    yields = weight_yields(machine, *machine.robot.pose(legs, branch)) if loaded else 0.0
-    return there.commands(legs + yields, branch)
+    branch, loaded = np.array(component), is_compensated(job, machine)
+    legs, beyond, *ways = (
+        counted(machine, *machine.robot.pose(lengths, branch), loaded=loaded)
+        for lengths in (found.legs, found.beyond, *found.ways)
+    )
+    return replace(found, legs=legs, beyond=beyond, ways=tuple(ways))

@@ -14,11 +14,13 @@ from pentapod.cutters.tool import Tool
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.build.tool import job_tool
+from pentapod.job.build.values import is_compensated
 from pentapod.job.outcome import Outcome
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.placed_path import PlacedPath
+from pentapod.program.commands import counted
 from pentapod.program.program import Program
 from pentapod.report.drawings.held import Held, held_at
 from pentapod.timing.time_law.trajectory import Trajectory
@@ -30,7 +32,7 @@ UPRIGHT = 5e-5
 
 @dataclass(frozen=True, eq=False)
 class Pose(Value):
-    """The machine at a pose of the tool: tip, axis (3,), machine frame; legs (n_legs,). Metres."""
+    """The machine at a pose of the tool: tip, axis (3,), machine frame; legs (n_legs,) as drives count. Metres."""
 
     tip: Floats
     axis: Floats
@@ -165,8 +167,12 @@ class PlannedRun(Value):
 
     def pose(self, tip: Floats, axis: Floats) -> Pose:
         """Return the pose with a tip and a tool axis (3,), machine frame."""
-        legs = self.machine.robot.leg_lengths(tip + self.machine.tool_length * axis, -axis)
-        return Pose(tip, axis, legs)
+        return Pose(tip, axis, self.counted(tip[None], axis[None])[0])
+
+    def counted(self, tips: Floats, axes: Floats) -> Floats:
+        """Return what drives count (N, n_legs) at rest with tips and tool axes (N, 3), machine frame; metres."""
+        position = tips + self.machine.tool_length * axes
+        return counted(self.machine, position, -axes, loaded=is_compensated(self.job, self.machine))
 
     @cached_property
     def segment_times(self) -> Floats | None:
@@ -183,6 +189,5 @@ class PlannedRun(Value):
     def _row(self, row: int) -> Pose:
         if self.program is None:
             return self.pose(self.tips[row], self.axes[row])
-        robot, legs = self.machine.robot, self.program.legs[row]
-        (position,), (direction,) = robot.pose(legs[None], self.program.component)
-        return Pose(position + self.machine.tool_length * direction, -direction, legs)
+        (position,), (direction,) = self.machine.robot.pose(self.program.legs[row][None], self.program.component)
+        return self.pose(position + self.machine.tool_length * direction, -direction)

@@ -27,7 +27,7 @@ class TouchOff:
     """A point of the part and the tool on it, metres. waypoint: of the toolpath.
 
     on_part, in_machine (3,): the point, mesh frame and machine frame; tip, axis (3,): of the tool, machine frame;
-    legs (n_legs,).
+    legs (n_legs,) as drives count.
     """
 
     waypoint: int
@@ -43,10 +43,10 @@ def touch_off_points(run: PlannedRun) -> list[TouchOff]:
     rows = _spread(run, COUNT)
     if not len(rows):
         return []
-    machine, tips, axes = run.machine, run.tips[rows], run.axes[rows]
+    tips, axes = run.tips[rows], run.axes[rows]
     centres = run.placement.inverse().apply(tips + run.toolpath.tilt_centre * axes)
     feet = centres - FacetTree.of(run.mesh).closest(centres)[1]
-    legs = machine.robot.leg_lengths(tips + machine.tool_length * axes, -axes)
+    legs = run.counted(tips, axes)
     there = run.placement.apply(feet)
     return [
         TouchOff(int(row), *values) for row, *values in zip(rows.tolist(), feet, there, tips, axes, legs, strict=True)
