@@ -26,6 +26,7 @@ from pentapod.timing.time_law.trajectory import Profile, Trajectory
 from pentapod.toolpath.formats.npz import toolpath_arrays
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.toolpath.toolpath import Toolpath
+from pentapod.verify.verdict.material_left import MaterialLeft
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -64,6 +65,13 @@ STORY_FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
     "explanation.lower_bound_s": ("f", ()),
 }
 """Arrays of the limits on the motion: their names, how long each holds, and the time lost there to the lower bound."""
+
+LEFT_FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
+    "left.points_mm": ("f", (None, 3)),
+    "left.heights_mm": ("f", (None,)),
+    "left.allowed_far_mm": ("f", (2,)),
+}
+"""Arrays of what the cutter leaves: points of the surface, heights above them, what may be left, and the largest."""
 
 GUIDES = "placed.guides_mm"
 """Positions of the base joints along their guides, for a reconfigurable machine."""
@@ -115,7 +123,16 @@ def arrays_of(outcome: Outcome, folder: Path) -> Arrays:
         arrays |= _story(story)
     if (program := outcome.find(Program)) is not None:
         arrays |= _in_units({"program.time_s": program.times, "program.legs_mm": program.legs})
+    if (left := outcome.verdict.left) is not None:
+        bounds = np.array([left.allowed, left.far])
+        arrays |= _in_units(dict(zip(LEFT_FORMS, (left.points, left.heights, bounds), strict=True)))
     return arrays
+
+
+def left_of(arrays: Mapping[str, NDArray[Any]]) -> MaterialLeft:
+    """Return what the cutter leaves on the surface, as plan.npz has it in arrays of `LEFT_FORMS`."""
+    points, heights, (allowed, far) = (to_si(arrays[name], "mm") for name in LEFT_FORMS)
+    return MaterialLeft(points, heights, float(allowed), float(far))
 
 
 def _relative(job: Path, folder: Path) -> str:

@@ -39,6 +39,7 @@ from pentapod.verify.claims import (
 from pentapod.verify.replay.claim import Claim, Idle
 from pentapod.verify.replay.replay import REPLAY_SHARE, Replay
 from pentapod.verify.surface import surface_left
+from pentapod.verify.surface.left_map import material_left
 from pentapod.verify.verdict.specification import Asked, Specification
 from pentapod.verify.verdict.verdict import Certificate, NotJudged, Place, Verdict
 
@@ -150,8 +151,9 @@ def judged(
             unjudged.append(NotJudged(claim.name, answer.why, claim.name in specification.waived))
         elif strict:
             read.append(claim.inapplicable(answer))
+    left = None if len(replay.unposed) or len(replay.interval_bounds.unproven) else material_left(replay)
     progress("verify", 1.0)
-    return Verdict(tuple(read), tuple(unjudged), sources, springs_digest(program, specification.machine))
+    return Verdict(tuple(read), tuple(unjudged), sources, springs_digest(program, specification.machine), left)
 
 
 def _answers(replay: Replay, claims: Sequence[Claim]) -> Iterator[Certificate | Idle]:

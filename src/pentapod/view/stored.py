@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,12 +19,13 @@ from pentapod.geometry.polyline import arc_length
 from pentapod.job.artefacts import ARRAYS, VERDICT
 from pentapod.job.build.limits import placement_limits
 from pentapod.job.outcome import Outcome
-from pentapod.job.plan_arrays import PIECE_STARTS, PROFILE_FORMS, STORY_FORMS, profile_of, story_of
+from pentapod.job.plan_arrays import LEFT_FORMS, PIECE_STARTS, PROFILE_FORMS, STORY_FORMS, left_of, profile_of, story_of
 from pentapod.job.stage_runner import Stage
 from pentapod.planning import PlacedPath, Placement
 from pentapod.planning.limits.margins import Margins
 from pentapod.timing.explain import Explanation
 from pentapod.timing.time_law.trajectory import Profile
+from pentapod.verify.verdict.material_left import MaterialLeft
 from pentapod.verify.verdict.verdict import Certificate, NotJudged, Place, Sources, Verdict
 from pentapod.view.opened_run import OpenedRun
 
@@ -99,7 +100,7 @@ def stored_outcome(run: OpenedRun, placed: PlacedPath) -> Outcome:
     """
     content = _verdict_content(run.folder / VERDICT)
     try:
-        verdict, refusal = _verdict(content), _refusal(content.get("refusal"))
+        verdict, refusal = replace(_verdict(content), left=_left(run)), _refusal(content.get("refusal"))
     except (TypeError, ValueError, KeyError, AttributeError) as error:
         raise InputError("a broken verdict", file=run.folder / VERDICT, remedy="plan the job again") from error
     values = (run.mesh, run.toolpath, placed, run.program, run.piece, _story(run), refusal)
@@ -116,6 +117,17 @@ def _story(run: OpenedRun) -> Explanation | None:
     for name, form in STORY_FORMS.items():
         check_array(arrays[name], name, file, InputError, *form)
     return story_of(arrays)
+
+
+def _left(run: OpenedRun) -> MaterialLeft | None:
+    """Return what the cutter leaves on the surface; None where nothing says it, or an older version judged the run."""
+    file = run.folder / ARRAYS
+    arrays = read_arrays(file, (), InputError, optional=LEFT_FORMS)
+    if len(arrays) < len(LEFT_FORMS):
+        return None
+    for name, form in LEFT_FORMS.items():
+        check_array(arrays[name], name, file, InputError, *form)
+    return left_of(arrays)
 
 
 def _verdict_content(file: Path) -> Mapping[str, Any]:

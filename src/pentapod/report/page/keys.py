@@ -21,6 +21,7 @@ from pentapod.report.signals import Signals
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.replay.free_space import PosedPolyline
 from pentapod.verify.replay.path_matching import match
+from pentapod.verify.verdict.material_left import MaterialLeft
 
 SEGMENT_KINDS = (SegmentKind.CUT, SegmentKind.LINK, SegmentKind.RAPID)
 
@@ -83,7 +84,8 @@ class Keys:
     beside (B,): legs whose joints are not on the tool axis; joints (K, B, 3), metres. margins, nearest, deviations: the
     smallest margin, its limit, and the largest deviation, metres, from a key to the next. shares: of the feed. forces:
     of the leg with the largest, for a force of 1 N on the tip in the worst direction. pushes: the largest
-    share, from a key to the next, of what a drive has there. deflections: the largest of the tip. None where not known.
+    share, from a key to the next, of what a drive has there. deflections: the largest of the tip. left:
+    the largest height of what is left on the surface at the key, metres. None where not known.
     """
 
     rows: Ints
@@ -96,10 +98,18 @@ class Keys:
     forces: Floats
     pushes: Floats | None
     deflections: Floats | None
+    left: Floats | None
 
     @classmethod
-    def of(cls, signals: Signals, machine: Machine, placed: PlacedPath, tolerance: float) -> Keys:
-        """Return the keys of a program. tolerance: of the program against the path, metres."""
+    def of(
+        cls,
+        signals: Signals,
+        machine: Machine,
+        placed: PlacedPath,
+        tolerance: float,
+        left: MaterialLeft | None = None,
+    ) -> Keys:
+        """Return the keys of a program. tolerance: of the program against the path, metres. left: on the surface."""
         tips, axes = signals.tips, signals.axes
         beside, joints = legs_beside(machine, tips, axes)
         far = 1e3 * (machine.tool_length - machine.line_top)
@@ -117,6 +127,7 @@ class Keys:
             np.linalg.norm(loads, axis=-1).max(axis=-1),
             _pushes(signals, rows),
             None if signals.deflections is None else np.maximum.reduceat(signals.deflections[:, 0], rows),
+            None if left is None else _left(signals, placed, rows, left),
         )  # fmt: skip
 
     def pack(self, packed: Packed, signals: Signals, kinds: Sequence[SegmentKind], period: float) -> None:
@@ -134,11 +145,14 @@ class Keys:
             packed.numbers("key.push", 100.0 * self.pushes, 0.1)
         if self.deflections is not None:
             packed.numbers("key.deflection", 1e6 * self.deflections)
+        if self.left is not None:
+            packed.numbers("key.left", 1e3 * self.left, 0.001)
 
-    def scales(self, tolerance: float, deflection: float | None) -> list[dict[str, Any]]:
+    def scales(self, tolerance: float, deflection: float | None, left: float | None) -> list[dict[str, Any]]:
         """Return by what the path can be coloured: name, array, unit, the worst and the best value, words at both ends.
 
         tolerance: of the program against the path, metres. deflection: as much as is allowed of the tip, if a job says.
+        left: as much as may be left on the surface.
         """
         strongest, weakest = float(np.nanmax(self.forces)), float(np.nanmin(self.forces))
         scales = [
@@ -161,7 +175,30 @@ class Keys:
             most = 1e6 * (float(np.nanmax(self.deflections)) if deflection is None else deflection)
             words = f"{most:.3g} µm, {'the largest' if deflection is None else 'as much as is allowed'}"
             scales.append(_scale("deflection of the tip", "key.deflection", " µm", most, 0.0, (words, "0 µm")))
+        if self.left is not None and left is not None:
+            words = (f"{1e3 * left:.3g} mm or more: too much", f"{5e2 * left:.3g}", "0 mm")
+            scales.append(_scale("material left", "key.left", " mm", 1e3 * left, 0.0, words))
         return scales
+
+
+def _left(signals: Signals, placed: PlacedPath, rows: Ints, left: MaterialLeft) -> Floats:
+    """Return the largest height (K,) of what is left at the points of the surface that are nearest to each key.
+
+    Where no point is nearest to a key, it is that of the point nearest to it.
+    """
+    from scipy.spatial import KDTree  # noqa: PLC0415  only where there is such a map
+
+    centres = placed.placement.transform.inverse().apply(
+        signals.tips[rows] + placed.toolpath.tilt_centre * signals.axes[rows]
+    )
+    heights = left.heights[KDTree(left.points).query(centres)[1]]
+    cuts = np.flatnonzero(signals.cutting[rows])
+    if len(cuts):
+        nearest = cuts[KDTree(centres[cuts]).query(left.points)[1]]
+        most = np.full(len(rows), -np.inf)
+        np.maximum.at(most, nearest, left.heights)
+        heights = np.where(np.isfinite(most), most, heights)
+    return np.asarray(heights, dtype=np.float64)
 
 
 def _pushes(signals: Signals, rows: Ints) -> Floats | None:

@@ -117,7 +117,8 @@ class ReportedRun:
         placed = self.outcome.find(PlacedPath)
         if self.signals is None or placed is None:
             return None
-        return Keys.of(self.signals, self.machine, placed, self.outcome.job.tolerance.si.path)
+        tolerance = self.outcome.job.tolerance.si.path
+        return Keys.of(self.signals, self.machine, placed, tolerance, self.outcome.verdict.left)
 
     def motion(self, packed: Packed) -> dict[str, Any] | None:
         """Add the arrays of the motion to the page's and return the rest; None without a program."""
@@ -125,7 +126,7 @@ class ReportedRun:
         toolpath, program = find(Toolpath), find(Program)
         if signals is None or keys is None or toolpath is None or program is None:
             return None
-        tolerance = self.outcome.job.tolerance.si
+        tolerance, left = self.outcome.job.tolerance.si, self.outcome.verdict.left
         keys.pack(packed, signals, [segment.kind for segment in toolpath.segments], program.period)
         return {
             "start": self.least[2],
@@ -142,7 +143,7 @@ class ReportedRun:
             ],
             "kind_names": [kind.value for kind in SEGMENT_KINDS],
             "margins": signals.margin_names,
-            "scales": keys.scales(tolerance.path, tolerance.deflection),
+            "scales": keys.scales(tolerance.path, tolerance.deflection, None if left is None else left.allowed),
         }
 
 

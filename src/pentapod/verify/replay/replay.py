@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,11 @@ class Replay(Value):
     program: Program
     specification: Specification
     progress: Progress = silent
+
+    @cached_property
+    def kept(self) -> dict[Any, Any]:
+        """What claims have computed of this replay and others may use, by keys of their own."""
+        return {}
 
     @property
     def machine(self) -> Machine:

@@ -131,6 +131,7 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
         one = SweptSolid.of(replay, solid, chords, max(OPTIONS.near_m, OPTIONS.near_share * coverage.left))
         if one is not None:
             swept.append(one)
+            replay.kept.setdefault(SweptSolid, []).append(one)
             cells, at = one.uncovered(corners, normals, height, coarse, fine)
             highest = at if at[0] > highest[0] else highest
             corners, normals = cells[:, :9].reshape(-1, 3, 3), np.ascontiguousarray(cells[:, 9:])

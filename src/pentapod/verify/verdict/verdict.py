@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from pentapod.base.display import html_table, load_extra
 from pentapod.base.values import Result, Value
 from pentapod.base.version import __version__, library_versions, processor_kind
+from pentapod.verify.verdict.material_left import MaterialLeft
 
 _COLUMNS = ["claim", "answer", "value", "bound", "unit", "time_s", "row", "segment", "method"]
 _SHOWN = 12
@@ -109,7 +110,8 @@ class NotJudged(Value):
 class Verdict(Result):
     """All certificates of a program, the claims that were not judged, and the files that it is about.
 
-    springs: digest of the stiffness and the masses by which the program is compensated; "" where it is not.
+    springs: digest of the stiffness and the masses by which the program is compensated; "" where it is not. left: what
+    the cutter leaves on the surface; None for beams, and where no surface is given.
 
     >>> [claim.claim for claim in verdict.certificates if not claim.passed]
     []
@@ -121,6 +123,7 @@ class Verdict(Result):
     not_judged: tuple[NotJudged, ...] = ()
     sources: Sources = NO_SOURCES
     springs: str = ""
+    left: MaterialLeft | None = field(default=None, compare=False, repr=False)
 
     @property
     def passed(self) -> bool:
