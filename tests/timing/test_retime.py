@@ -124,7 +124,7 @@ def test_limits_hold_between_gridpoints_and_are_used(name):
     assert max(v, a, mean / piece.section_feeds[0]) < 1.0
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(
     length=st.floats(-7, 0),
     shape=st.floats(-1.3, 1.5),
@@ -237,7 +237,7 @@ def test_retime_of_a_reversed_path_takes_as_long(name):
     assert again.duration == pytest.approx(there.duration, rel=2e-3)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(k=st.floats(0.05, 20.0))
 def test_retime_does_not_depend_on_units(k):
     """Lengths times k take as long when every limit is times k."""
