@@ -31,6 +31,7 @@ enum {
 #define PENTAPOD_DIGEST_LOW 0x@DIGEST_LOW@u
 #define PENTAPOD_TOOL_LENGTH @TOOL_LENGTH@
 #define PENTAPOD_AS_BUILT @AS_BUILT@ /* 1: measured base joints, offsets, rings and zeros, not those of the design */
+#define PENTAPOD_RINGS @RINGS@ /* 1: some platform joints are on rings around the tool axis */
 #define PENTAPOD_DEGREE 0x1.1df46a2529d39p-6
 
 /* The design: leg 3's base joint and offset, the slope of the offsets, and the component's signs of w and S. */
@@ -45,6 +46,8 @@ static const double PENTAPOD_OFFSET[PENTAPOD_LEGS] = @OFFSET@;
 #if PENTAPOD_AS_BUILT
 static const double PENTAPOD_RING[PENTAPOD_LEGS] = @RING@;
 static const double PENTAPOD_ZERO[PENTAPOD_LEGS] = @ZERO@;
+/* Without rings: q/2, x, y, u, v of half the five squared lengths, and the constant; what p . i, z, w add to them. */
+static const double PENTAPOD_OF_SQUARES[5][6] = @OF_SQUARES@, PENTAPOD_OF_THREE[5][3] = @OF_THREE@;
 #endif
 
 /* Machine frame to the controller's: turn each axis (1 or -1), then shift. */
@@ -92,7 +95,8 @@ static inline double pentapod_share(double a)
 
 /* ---- poses to legs ---- */
 
-static inline void pentapod_struts_of_line(const pentapod_line *line, pentapod_struts *struts)
+/* The vectors alone. */
+static inline void pentapod_vectors_of_line(const pentapod_line *line, pentapod_struts *struts)
 {
     const double *p = line->point, *i = line->direction;
     int k;
@@ -117,6 +121,15 @@ static inline void pentapod_struts_of_line(const pentapod_line *line, pentapod_s
         struts->vector[0][k] = x;
         struts->vector[1][k] = y;
         struts->vector[2][k] = z;
+    }
+}
+
+static inline void pentapod_struts_of_line(const pentapod_line *line, pentapod_struts *struts)
+{
+    int k;
+    pentapod_vectors_of_line(line, struts);
+    for (k = 0; k < PENTAPOD_LEGS; k++) {
+        double x = struts->vector[0][k], y = struts->vector[1][k], z = struts->vector[2][k];
         struts->length[k] = sqrt(x * x + y * y + z * z);
     }
 }
@@ -184,129 +197,225 @@ static inline double pentapod_surface(const pentapod_line *line)
 
 #if PENTAPOD_AS_BUILT
 
-enum { PENTAPOD_ROUNDS = 12, PENTAPOD_STAGES = 8 };
+enum { PENTAPOD_ROUNDS = 16, PENTAPOD_STAGES = 8 };
 
-/* Solve a x = b by elimination with row exchanges; b becomes x. -1 where a pivot vanishes. */
-static inline int pentapod_solve(double a[PENTAPOD_LEGS][PENTAPOD_LEGS], double b[PENTAPOD_LEGS])
+#if !PENTAPOD_RINGS
+
+static inline void pentapod_cross(const double a[3], const double b[3], double out[3])
 {
-    int column, row, k;
-    for (column = 0; column < PENTAPOD_LEGS; column++) {
-        int best = column;
-        double inverse;
-        for (row = column + 1; row < PENTAPOD_LEGS; row++)
-            if (fabs(a[row][column]) > fabs(a[best][column]))
-                best = row;
-        if (!(fabs(a[best][column]) > 1e-9))
-            return -1;
-        if (best != column) {
-            double held = b[best];
-            b[best] = b[column];
-            b[column] = held;
-            for (k = column; k < PENTAPOD_LEGS; k++) {
-                held = a[best][k];
-                a[best][k] = a[column][k];
-                a[column][k] = held;
-            }
-        }
-        inverse = 1.0 / a[column][column];
-        for (row = column + 1; row < PENTAPOD_LEGS; row++) {
-            double factor = a[row][column] * inverse;
-            for (k = column + 1; k < PENTAPOD_LEGS; k++)
-                a[row][k] -= factor * a[column][k];
-            b[row] -= factor * b[column];
-        }
-    }
-    for (row = PENTAPOD_LEGS - 1; row >= 0; row--) {
-        for (k = row + 1; k < PENTAPOD_LEGS; k++)
-            b[row] -= a[row][k] * b[k];
-        b[row] /= a[row][row];
-    }
-    return 0;
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* One Newton step towards these lengths: x, y, z of the point, u and v of the direction. -1 where there is none.
- * off: the largest difference of a length before the step. */
-static inline int pentapod_step(
-    const double length[PENTAPOD_LEGS], const pentapod_line *line, double step[PENTAPOD_LEGS], double *off)
-{
-    const double *p = line->point, *i = line->direction;
-    double rows[PENTAPOD_LEGS][PENTAPOD_LEGS];
-    pentapod_struts struts;
-    int k, c;
-    pentapod_struts_of_line(line, &struts);
-    *off = 0.0;
-    for (k = 0; k < PENTAPOD_LEGS; k++) {
-        double unit[3], turn[3], inverse = 1.0 / struts.length[k];
-        for (c = 0; c < 3; c++) {
-            unit[c] = struts.vector[c][k] * inverse;
-            turn[c] = PENTAPOD_OFFSET[k] * unit[c];
-        }
-        if (PENTAPOD_RING[k] > 0.0) {
-            /* The ring turns with the line: what the direction does to the way across it. */
-            double d[3], across[3], along, lean, radius, share, m[3], by_m;
-            for (c = 0; c < 3; c++)
-                d[c] = p[c] - PENTAPOD_BASE[c][k];
-            along = d[0] * i[0] + d[1] * i[1] + d[2] * i[2];
-            for (c = 0; c < 3; c++)
-                across[c] = d[c] - along * i[c];
-            radius = sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
-            share = PENTAPOD_RING[k] / radius;
-            for (c = 0; c < 3; c++)
-                m[c] = across[c] / radius;
-            by_m = unit[0] * m[0] + unit[1] * m[1] + unit[2] * m[2];
-            lean = unit[0] * i[0] + unit[1] * i[1] + unit[2] * i[2];
-            for (c = 0; c < 3; c++) {
-                double sheared = unit[c] - by_m * m[c];
-                turn[c] += share * (along * sheared + lean * d[c]);
-                unit[c] -= share * (sheared - lean * i[c]);
-            }
-        }
-        for (c = 0; c < 3; c++)
-            rows[k][c] = unit[c];
-        rows[k][3] = turn[0] - turn[2] * i[0] / i[2];
-        rows[k][4] = turn[1] - turn[2] * i[1] / i[2];
-        step[k] = length[k] - struts.length[k];
-        *off = pentapod_most(*off, fabs(step[k]));
-    }
-    for (k = 0; k < PENTAPOD_LEGS; k++) {
-        rows[k][3] *= 0x1p-8; /* in 256 mm: columns of about one size */
-        rows[k][4] *= 0x1p-8;
-    }
-    if (pentapod_solve(rows, step))
-        return -1;
-    step[3] *= 0x1p-8;
-    step[4] *= 0x1p-8;
-    return 0;
-}
-
-/* From a pose to the one of these lengths. 0, or -1 where a step is more than half the one before. */
+/* From a pose to the one of these lengths. 0, or -1 where a step is more than half the one before.
+ * Half a squared length is linear in q/2 = |p|^2/2, p . i, p and i. So five of these eight follow from p . i, z and w,
+ * and Newton's steps solve three equations: |i| = 1, |p|^2 = q, and p . i itself. */
 static inline int pentapod_newton(const double length[PENTAPOD_LEGS], pentapod_line *line)
 {
-    double step[PENTAPOD_LEGS], before = 0.0, size, off, w_squared;
-    int round, k;
+    const double (*of)[3] = PENTAPOD_OF_THREE;
+    double *p = line->point, *i = line->direction;
+    double three[3], five[5], step[3], before = 0.0, share = 1.0;
+    int round, k, c;
+    three[0] = p[0] * i[0] + p[1] * i[1] + p[2] * i[2];
+    three[1] = p[2];
+    three[2] = i[2];
+    for (k = 0; k < 5; k++) {
+        five[k] = PENTAPOD_OF_SQUARES[k][5];
+        for (c = 0; c < PENTAPOD_LEGS; c++)
+            five[k] += PENTAPOD_OF_SQUARES[k][c] * (0.5 * length[c] * length[c]);
+        for (c = 0; c < 3; c++)
+            five[k] += of[k][c] * three[c];
+    }
     for (round = 0; round < PENTAPOD_ROUNDS; round++) {
-        if (pentapod_step(length, line, step, &off))
-            return -1;
-        size = 256.0 * pentapod_most(fabs(step[3]), fabs(step[4]));
-        for (k = 0; k < 3; k++) {
-            size = pentapod_most(size, fabs(step[k]));
-            line->point[k] += step[k];
+        double x = five[1], y = five[2], z = three[1], u = five[3], v = five[4], w = three[2];
+        double f = 0.5 * (u * u + v * v + w * w - 1.0);
+        double g = 0.5 * (x * x + y * y + z * z) - five[0];
+        double h = x * u + y * v + z * w - three[0];
+        double df[3], dg[3], dh[3], by_f[3], by_g[3], by_h[3], inverse, size;
+        for (c = 0; c < 3; c++) {
+            df[c] = u * of[3][c] + v * of[4][c];
+            dg[c] = x * of[1][c] + y * of[2][c] - of[0][c];
+            dh[c] = x * of[3][c] + u * of[1][c] + y * of[4][c] + v * of[2][c];
         }
-        line->direction[0] += step[3];
-        line->direction[1] += step[4];
-        w_squared = 1.0 - line->direction[0] * line->direction[0] - line->direction[1] * line->direction[1];
-        if (!(w_squared > 0.0))
+        df[2] += w;
+        dg[1] += z;
+        dh[0] -= 1.0;
+        dh[1] += w;
+        dh[2] += z;
+        pentapod_cross(dg, dh, by_f);
+        pentapod_cross(dh, df, by_g);
+        pentapod_cross(df, dg, by_h);
+        inverse = -1.0 / (df[0] * by_f[0] + df[1] * by_f[1] + df[2] * by_f[2]);
+        for (c = 0; c < 3; c++) {
+            step[c] = inverse * (f * by_f[c] + g * by_g[c] + h * by_h[c]);
+            three[c] += step[c];
+        }
+        size = pentapod_most(fabs(step[1]), 256.0 * fabs(step[2]));
+        for (k = 0; k < 5; k++) {
+            double more = of[k][0] * step[0] + of[k][1] * step[1] + of[k][2] * step[2];
+            five[k] += more;
+            if (k > 0)
+                size = pentapod_most(size, (k > 2 ? 256.0 : 1.0) * fabs(more));
+        }
+        if (!(PENTAPOD_SIGN_W * three[2] > 0.0 && size < 1e9))
             return -1;
-        line->direction[2] = PENTAPOD_SIGN_W * sqrt(w_squared);
-        /* Each step is about the square of the one before: this one leaves nothing. */
-        if (size < 1e-6 && off < 1e-6)
+        if (round > 0)
+            share = size / before;
+        /* What rounding leaves does not get less; else each step is at most half the one before. */
+        if (size < 1e-10 || share * size < 1e-11) {
+            p[0] = five[1];
+            p[1] = five[2];
+            p[2] = three[1];
+            i[0] = five[3];
+            i[1] = five[4];
+            i[2] = three[2];
             return 0;
-        if (round > 0 && !(size <= 0.5 * before))
+        }
+        if (!(share <= (round > 0 ? 0.5 : 1.0)))
             return -1;
         before = size;
     }
     return -1;
 }
+
+#else
+
+/* Derivatives of half the squared lengths, by x, y, z of the point and by u, v of the direction (in 256 mm, so that the
+ * columns are of about one size), as the factors of an elimination with row exchanges. */
+typedef struct {
+    double rows[PENTAPOD_LEGS][PENTAPOD_LEGS], inverse[PENTAPOD_LEGS];
+    int order[PENTAPOD_LEGS];
+} pentapod_factors;
+
+/* -1 where a pivot vanishes. */
+static inline int pentapod_factor(const pentapod_line *line, const pentapod_struts *struts, pentapod_factors *factors)
+{
+    const double *p = line->point, *i = line->direction;
+    double (*a)[PENTAPOD_LEGS] = factors->rows;
+    double by_u = i[0] / i[2], by_v = i[1] / i[2];
+    int column, row, k, c;
+    for (k = 0; k < PENTAPOD_LEGS; k++) {
+        double vector[3], turn[3];
+        for (c = 0; c < 3; c++) {
+            vector[c] = struts->vector[c][k];
+            turn[c] = PENTAPOD_OFFSET[k] * vector[c];
+        }
+        if (PENTAPOD_RING[k] > 0.0) {
+            /* The ring turns with the line: what the direction does to the way across it. */
+            double d[3], across[3], along, lean, inverse, share, m[3], by_m;
+            for (c = 0; c < 3; c++)
+                d[c] = p[c] - PENTAPOD_BASE[c][k];
+            along = d[0] * i[0] + d[1] * i[1] + d[2] * i[2];
+            for (c = 0; c < 3; c++)
+                across[c] = d[c] - along * i[c];
+            inverse = 1.0 / sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
+            share = PENTAPOD_RING[k] * inverse;
+            for (c = 0; c < 3; c++)
+                m[c] = across[c] * inverse;
+            by_m = vector[0] * m[0] + vector[1] * m[1] + vector[2] * m[2];
+            lean = vector[0] * i[0] + vector[1] * i[1] + vector[2] * i[2];
+            for (c = 0; c < 3; c++) {
+                double sheared = vector[c] - by_m * m[c];
+                turn[c] += share * (along * sheared + lean * d[c]);
+                vector[c] -= share * (sheared - lean * i[c]);
+            }
+        }
+        for (c = 0; c < 3; c++)
+            a[k][c] = vector[c];
+        a[k][3] = 0x1p-8 * (turn[0] - turn[2] * by_u);
+        a[k][4] = 0x1p-8 * (turn[1] - turn[2] * by_v);
+        factors->order[k] = k;
+    }
+    for (column = 0; column < PENTAPOD_LEGS; column++) {
+        int best = column;
+        for (row = column + 1; row < PENTAPOD_LEGS; row++)
+            if (fabs(a[row][column]) > fabs(a[best][column]))
+                best = row;
+        if (!(fabs(a[best][column]) > 1e-6))
+            return -1;
+        if (best != column) {
+            int other = factors->order[best];
+            factors->order[best] = factors->order[column];
+            factors->order[column] = other;
+            for (k = 0; k < PENTAPOD_LEGS; k++) {
+                double held = a[best][k];
+                a[best][k] = a[column][k];
+                a[column][k] = held;
+            }
+        }
+        factors->inverse[column] = 1.0 / a[column][column];
+        for (row = column + 1; row < PENTAPOD_LEGS; row++) {
+            double factor = a[row][column] *= factors->inverse[column];
+            for (k = column + 1; k < PENTAPOD_LEGS; k++)
+                a[row][k] -= factor * a[column][k];
+        }
+    }
+    return 0;
+}
+
+/* The step that these derivatives ask for. */
+static inline void pentapod_step(
+    const pentapod_factors *factors, const double rest[PENTAPOD_LEGS], double step[PENTAPOD_LEGS])
+{
+    int row, k;
+    for (row = 0; row < PENTAPOD_LEGS; row++) {
+        step[row] = rest[factors->order[row]];
+        for (k = 0; k < row; k++)
+            step[row] -= factors->rows[row][k] * step[k];
+    }
+    for (row = PENTAPOD_LEGS - 1; row >= 0; row--) {
+        for (k = row + 1; k < PENTAPOD_LEGS; k++)
+            step[row] -= factors->rows[row][k] * step[k];
+        step[row] *= factors->inverse[row];
+    }
+}
+
+/* From a pose to the one of these lengths. 0, or -1 where a step is more than half the one before. The derivatives are
+ * those of an earlier pose as long as each step is at most a 32nd of the one before. */
+static inline int pentapod_newton(const double length[PENTAPOD_LEGS], pentapod_line *line)
+{
+    pentapod_factors factors;
+    pentapod_struts struts;
+    double rest[PENTAPOD_LEGS], step[PENTAPOD_LEGS], before = 0.0, share = 1.0, size, off, w_squared;
+    int round, k;
+    for (round = 0; round < PENTAPOD_ROUNDS; round++) {
+        pentapod_vectors_of_line(line, &struts);
+        off = 0.0;
+        for (k = 0; k < PENTAPOD_LEGS; k++) {
+            double x = struts.vector[0][k], y = struts.vector[1][k], z = struts.vector[2][k];
+            rest[k] = 0.5 * (length[k] * length[k] - x * x - y * y - z * z);
+            off = pentapod_most(off, fabs(rest[k]));
+        }
+        if (share > 0x1p-5 && pentapod_factor(line, &struts, &factors))
+            return -1;
+        pentapod_step(&factors, rest, step);
+        size = pentapod_most(fabs(step[3]), fabs(step[4]));
+        for (k = 0; k < 3; k++) {
+            size = pentapod_most(size, fabs(step[k]));
+            line->point[k] += step[k];
+        }
+        line->direction[0] += 0x1p-8 * step[3];
+        line->direction[1] += 0x1p-8 * step[4];
+        w_squared = 1.0 - line->direction[0] * line->direction[0] - line->direction[1] * line->direction[1];
+        if (!(w_squared > 0.0))
+            return -1;
+        line->direction[2] = PENTAPOD_SIGN_W * sqrt(w_squared);
+        if (round > 0) {
+            share = size / before;
+            if (!(share <= 0.5))
+                /* What rounding leaves does not get less. */
+                return size < 1e-9 && off < 1e-6 ? 0 : -1;
+        }
+        /* The next step would be about this share of this one: nothing is left. */
+        if (share * size < 1e-11 && off < 1e-3)
+            return 0;
+        before = size;
+    }
+    return -1;
+}
+
+#endif
 
 #endif
 
