@@ -60,17 +60,20 @@ void others(long n, const double *legs, double slack, int *out)
         out[k] = pentapod_other_modes(legs + 5 * k, slack);
 }
 
-/* Rows of legs one after the other: known, stop and hold of each period. */
-void guards(long n, const double *legs, double period, int moving, const double *least, const double *fast, int *out)
+/* Rows of legs one after the other: known, stop and hold of each period; and by what the feed must be multiplied. */
+void guards(
+    long n, const double *legs, double period, int moving, double pace, const double *least, const double *fast,
+    int *out, double *feed)
 {
     pentapod_settings settings = {PENTAPOD_TOOL_LENGTH, {0}, {0}, 0.9, 0.45, 4.0};
-    pentapod_memory memory = {{0}, {0}, 0, 0};
+    pentapod_memory memory = {{0}, {0}, 0.0, 0, 0};
     pentapod_report report;
     long k;
     memcpy(settings.least, least, sizeof(settings.least));
     memcpy(settings.acceleration, fast, sizeof(settings.acceleration));
     for (k = 0; k < n; k++) {
-        pentapod_guard(legs + 5 * k, period, moving, &settings, &memory, &report);
+        pentapod_guard(legs + 5 * k, period, moving, pace, &settings, &memory, &report);
+        feed[k] = report.feed;
         out[3 * k] = report.known;
         out[3 * k + 1] = report.stop;
         out[3 * k + 2] = report.hold;
@@ -118,12 +121,19 @@ class Compiled:
 
     def guards(self, legs: np.ndarray, moving: bool, least: np.ndarray, fast: np.ndarray) -> np.ndarray:
         """Known, stop, hold (N, 3) of rows of legs, a millisecond apart."""
-        out = np.empty((len(legs), 3), dtype=np.intc)
-        arrays = _at(least := np.ascontiguousarray(least)), _at(fast := np.ascontiguousarray(fast)), _at(out)
-        self.library.guards(
-            len(legs), _at(legs := np.ascontiguousarray(legs)), ctypes.c_double(1e-3), int(moving), *arrays
-        )
-        return out
+        return self.guarded(legs, moving, 1.0, least, fast)[0]
+
+    def guarded(
+        self, legs: np.ndarray, moving: bool, pace: float, least: np.ndarray, fast: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The same, and by what the feed must be multiplied (N,). pace: share of the speed that is asked for."""
+        out, feed = np.empty((len(legs), 3), dtype=np.intc), np.empty(len(legs))
+        arrays = (
+            _at(least := np.ascontiguousarray(least)), _at(fast := np.ascontiguousarray(fast)), _at(out), _at(feed)
+        )  # fmt: skip
+        legs = np.ascontiguousarray(legs)
+        self.library.guards(len(legs), _at(legs), ctypes.c_double(1e-3), int(moving), ctypes.c_double(pace), *arrays)
+        return out, feed
 
 
 def _at(array: np.ndarray) -> ctypes.c_void_p:

@@ -48,7 +48,7 @@ def stand(limit):
         poll()
         still = still + 1 if status.position == last else 0
         last = status.position
-        if still > 8 and time.monotonic() - start > 0.12:
+        if still > 15 and time.monotonic() - start > 0.12:
             return True
     return False
 

@@ -109,6 +109,23 @@ def test_no_pose_has_impossible_legs(tmp_path):
 
 
 @compiled
+@pytest.mark.parametrize("pace", [0.02, 0.2, 0.5, 1.0])
+def test_feed_is_what_keeps_the_legs_in_their_rates_at_the_speed_that_is_asked_for(tmp_path, pace):
+    """So slowing down does not end between both: a leg 2.2 times too fast would stay 1.5 times too fast."""
+    machine = Machine.load("desk")
+    world = np.linspace(0.0, 1.0, 200)[:, None] * [60.0, 40.0, 0.0, 0.0, 0.0]
+    module = Compiled(machine, tmp_path)
+    legs, _ = module.inverses(world)
+    _, feed = module.guarded(legs, True, pace, np.full(7, -np.inf), np.full(5, 1e9))
+    rates = np.abs(np.diff(legs, axis=0) / 1e-3 / (MM * machine.legs.max_velocity)).max(axis=1)
+    # As slow as this, at the beginning of a motion, its share of the speed is not known well.
+    expected = np.ones(199) if pace == 0.02 else np.minimum(1.0, pace / rates)
+    assert feed[0] == 1.0
+    assert np.abs(feed[1:] - expected).max() < 1e-9
+    assert (expected < 1.0).all() == (pace in (0.2, 0.5))
+
+
+@compiled
 def test_world_comes_back(tmp_path):
     machine = calibrated(5)
     module = Compiled(machine, tmp_path)

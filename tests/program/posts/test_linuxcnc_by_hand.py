@@ -7,6 +7,7 @@ PENTAPOD_JOG_POSES=200 is the full figure: 40 s a pose.
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -123,3 +124,24 @@ def way_to(module: Compiled, there: np.ndarray) -> list[np.ndarray]:
         if (module.inverses(way)[1] > ROOM).all():
             return [middle, there]
     return []
+
+
+@pytest.mark.slow
+@built
+def test_a_program_with_m52_is_slowed_to_the_rates_of_the_legs(tmp_path):
+    """There and back at a feed at which a leg is more than twice too fast; M52 only on the way there."""
+    desk = Machine.load("desk")
+    machine = replace(desk, legs=replace(desk.legs, max_velocity=np.full(5, 0.04)))
+    folder_of(machine, tmp_path)
+    steps: list[dict[str, object]] = [
+        {"move": words} for words in ("G1 F6000 X-100 Y-60", "M52 P1", "G1 X100 Y60", "M52 P0", "G1 X-100 Y-60")
+    ]
+    table, told = run_jogs(tmp_path, steps, 120.0)
+    assert all(step[1] for step in told["done"]), told
+    rates = np.abs(np.diff(table[:, :5], axis=0)).max(axis=1) / 1e-3 / 40.0
+    still = np.flatnonzero(np.convolve(rates, np.ones(100), "valid") == 0.0)
+    moves = [rates[a:b] for a, b in pairwise(still) if b - a > 200]
+    _, slowed, whole = moves[-3:]
+    assert whole.max() > 2.0
+    assert slowed.max() < 1.05
+    assert np.median(slowed) > 0.95  # and no slower than that

@@ -168,6 +168,8 @@ def _guard_text(legs: int) -> str:
         *(f"net command{k + 1} joint.{k}.pos-cmd => pentapod.command.{k}" for k in range(legs)),
         *(f"net feedback{k + 1} joint.{k}.pos-fb => pentapod.feedback.{k}" for k in range(legs)),
         "net kind-of-motion motion.motion-type => pentapod.motion-type",
+        "net asked-speed motion.requested-vel => pentapod.requested-vel",
+        "net path-speed motion.current-vel => pentapod.current-vel",
         "net jog-stop pentapod.stop => motion.jog-stop",
         # M53 P0 masks the first, overrides that are switched off mask the second.
         "net hold pentapod.hold => motion.feed-hold motion.feed-inhibit",

@@ -609,6 +609,7 @@ typedef struct {
 
 typedef struct {
     double world[5], legs[PENTAPOD_LEGS];
+    double whole; /* largest leg rate by its limit, at the speed that the program asks for */
     int known, held;
 } pentapod_memory;
 
@@ -638,8 +639,9 @@ static inline int pentapod_too_near(
     return 0;
 }
 
+/* moving: a program; pace: its speed as a share of the one that it asks for. */
 static inline void pentapod_guard(
-    const double legs[PENTAPOD_LEGS], double period, int moving, const pentapod_settings *settings,
+    const double legs[PENTAPOD_LEGS], double period, int moving, double pace, const pentapod_settings *settings,
     pentapod_memory *memory, pentapod_report *report)
 {
     pentapod_line line;
@@ -667,7 +669,12 @@ static inline void pentapod_guard(
         for (k = 0; k < PENTAPOD_LEGS; k++)
             share = pentapod_most(share, fabs(legs[k] - memory->legs[k]) / (period * PENTAPOD_RATE[k]));
         report->rate_share = share;
-        report->feed = share > 1.0 ? 1.0 / share : 1.0;
+        /* Legs are as much slower as the path is: so it is known what they would do at the speed that is asked for. */
+        if (!moving)
+            memory->whole = 0.0;
+        else if (pace > 0.05)
+            memory->whole = share / pace;
+        report->feed = memory->whole > 1.0 ? 1.0 / memory->whole : 1.0;
         share = moving ? settings->path_share : settings->jog_share;
         for (k = 0; k < 5; k++) {
             rate[k] = (report->world[k] - memory->world[k]) / period;

@@ -22,6 +22,7 @@ static const char AXES[] = "xyzab";
 static struct pins {
     pentapod_real tool_length, least[PENTAPOD_MARGINS], acceleration[5], jog_share, path_share, lead;
     pentapod_real command[PENTAPOD_LEGS], feedback[PENTAPOD_LEGS];
+    pentapod_real requested_vel, current_vel;
     pentapod_bit enforce, known, stop, hold, confirm, ambiguous;
     pentapod_number motion_type;
     pentapod_count refusals, why, digest_high, digest_low;
@@ -93,6 +94,7 @@ static void guard(void *argument, long period)
     pentapod_settings settings;
     pentapod_report report;
     double command[PENTAPOD_LEGS], feedback[PENTAPOD_LEGS], real[5], error = 0.0;
+    double requested = GET_REAL(pins->requested_vel), pace = 0.0;
     pentapod_line told, measured;
     int k, known = memory.known;
     (void)argument;
@@ -107,7 +109,10 @@ static void guard(void *argument, long period)
         command[k] = GET_REAL(pins->command[k]);
         feedback[k] = GET_REAL(pins->feedback[k]);
     }
-    pentapod_guard(command, 1e-9 * (double)period, GET_NUMBER(pins->motion_type) != 0, &settings, &memory, &report);
+    if (requested > 0.0)
+        pace = GET_REAL(pins->current_vel) / requested;
+    pentapod_guard(
+        command, 1e-9 * (double)period, GET_NUMBER(pins->motion_type) != 0, pace, &settings, &memory, &report);
     /* When the pose becomes known: may the legs be those of another component? */
     if (report.known && !known)
         SET_BIT(pins->ambiguous, pentapod_other_modes(command, @SLACK@) != 0);
@@ -143,6 +148,8 @@ static int make_pins(void)
     bad |= NEW_REAL(owner, HAL_IN, pins->lead, @LEAD_PERIODS@, "pentapod.lead-periods");
     bad |= NEW_BIT(owner, HAL_IN, pins->enforce, 1, "pentapod.enforce");
     bad |= NEW_NUMBER(owner, HAL_IN, pins->motion_type, 0, "pentapod.motion-type");
+    bad |= NEW_REAL(owner, HAL_IN, pins->requested_vel, 0.0, "pentapod.requested-vel");
+    bad |= NEW_REAL(owner, HAL_IN, pins->current_vel, 0.0, "pentapod.current-vel");
     for (k = 0; k < PENTAPOD_MARGINS; k++) {
         bad |= NEW_REAL(owner, HAL_IN, pins->least[k], least[k], "pentapod.least.%s", MARGINS[k]);
         bad |= NEW_REAL(owner, HAL_OUT, pins->margin[k], 0.0, "pentapod.margin.%s", MARGINS[k]);
