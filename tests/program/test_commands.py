@@ -215,7 +215,7 @@ def test_a_job_is_compensated_by_itself_and_its_posted_rows_are_judged(soft_job,
     job.write_text((soft_job / "job.toml").read_text(encoding="utf-8"), encoding="utf-8")
     (tmp_path / "part.stl").write_bytes((soft_job / "part.stl").read_bytes())
     assert run(["verify", str(file), "--job", str(job)]) == 1
-    assert "a leg model, stiffness or weight of another machine" in capsys.readouterr().out
+    assert "commands of another leg model, stiffness or weight" in capsys.readouterr().out
     # Nor are commands made by springs that no verdict knows.
     planned, late = str(soft_job / "out" / "program.csv"), tmp_path / "late"
     assert run(["post", planned, "--to", "pvt", "-o", str(late), "--job", str(job)]) == 2

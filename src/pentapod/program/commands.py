@@ -71,7 +71,7 @@ def compensation_sentence(program: Program, machine: Machine) -> str:
         part = "" if share > MOST_OF_IT else f"{share:.0%} (the feed is too low, or legs yield too far, for all) of "
         process = f" and {part}{force.newtons:g} N against the motion on cuts"
     return (
-        f"posts compensate for what the legs yield to weight{process}: drives are told up to {most:.3g} um more or less"
+        f"posts compensate for what the legs yield to weight{process}: drives are told up to {most:.3g} µm more or less"
     )
 
 

@@ -63,4 +63,4 @@ def test_a_verdict_is_about_readings(machine, program):
 
     found = judge_machine(Replayed())
     assert not found.passed
-    assert "commands of drives" in found.method
+    assert "commands of another leg model" in found.method

@@ -67,8 +67,8 @@ def tool_facts(run: PlannedRun) -> list[Fact]:
         facts += [("process", str(Process().after(program.switches[0].words)) or "see the program's switches")]
     if program is not None and program.laser_power is not None:
         facts.append(("laser", f"up to {100.0 * float(program.laser_power.max()):.3g} % of full power"))
-    if program is not None and (made_good := compensation_sentence(program, machine)):
-        facts.append(("drives", made_good))
+    if program is not None and (compensated := compensation_sentence(program, machine)):
+        facts.append(("drives", compensated))
     if program is not None and program.rail_positions is not None:
         facts.append(("guides", ", ".join(words_of(1e3 * x, 3) for x in program.rail_positions)))
     return facts

@@ -74,7 +74,7 @@ def _place(replay: Replay, found: RunningMaximum, leg: int) -> Place:
 
 def _of(replay: Replay, method: str) -> str:
     """Return how a claim on the legs was judged, with whose lengths they are where drives are told others."""
-    return method if replay.made_good is None else f"{method}{_TOLD}"
+    return method if replay.compensated_by is None else f"{method}{_TOLD}"
 
 
 def nearest_leg(leg: int, method: str) -> str:

@@ -61,7 +61,7 @@ def deflection(replay: Replay) -> Finding | Idle:
     shift, way, value = found.shift[row], found.ways[row], float(total[row])
     way = shift + by_cutting[row] * (way if shift @ way >= 0.0 else -way)
     told = ", ".join(f"{x:+.2f}" for x in way / max(float(np.linalg.norm(way)), float(np.finfo(float).tiny)))
-    masses = "weight and acceleration" if replay.made_good is None else "acceleration"
+    masses = "weight and acceleration" if replay.compensated_by is None else "acceleration"
     process = replay.program.process_force
     cutting = f"{force:g} N in any direction on cuts"
     if process is not None:
@@ -73,7 +73,7 @@ def deflection(replay: Replay) -> Finding | Idle:
         f"{1e6 * by_cutting[row]:.3g} µm at most by {cutting}; towards about ({told}) in the machine's frame; "
         f"{masses} alone: {1e6 * by_masses.min():.3g} to {1e6 * by_masses.max():.3g} µm"
     )
-    if replay.made_good is not None:
+    if replay.compensated_by is not None:
         most = 1e6 * float(replay.sag.max())
         method += (
             f"; drives compensate for the weight{_process(replay)}, which moves the tip by up to {most:.3g} µm: legs "

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats
+from pentapod.base.errors import InputError
 from pentapod.geometry.polyline import arc_length
-from pentapod.program.commands import cutting_rows
+from pentapod.program.commands import cutting_rows, read_back
 from pentapod.program.program import GRAVITY, PROCESS
 from pentapod.toolpath.process import laser_power
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
@@ -21,10 +22,10 @@ def machine(replay: Replay) -> Finding:
     """Judge that the program was made for this machine, by name and by digest."""
     made_for, judged = replay.program.provenance, replay.machine
     if made_for.commands:
-        return Finding.without_value(
-            False,
-            "header: the rows are commands of drives, by a leg model, stiffness or weight of another machine",
-        )
+        try:
+            read_back(replay.program, judged)
+        except InputError as error:
+            return Finding.without_value(False, f"header: {error}")
     if made_for.compensation and not judged.yielding_known:
         return Finding.without_value(
             False, f"header: compensation of {made_for.compensation}, but the machine does not say how far legs yield"

@@ -78,14 +78,14 @@ class Replay(Value):
         def progress(share: float) -> None:
             self.progress("verify", REPLAY_SHARE * share, "between the rows")
 
-        more = self.made_good
+        more = self.compensated_by
         return interval_bounds(
             self.program, self.machine, self.toolpath.tilt_centre, self.path_tolerance, progress,
             told=None if more is None else self.program.legs + more,
         )  # fmt: skip
 
     @cached_property
-    def made_good(self) -> Floats | None:
+    def compensated_by(self) -> Floats | None:
         """By how much drives are told more than the rows (N, n_legs), because legs yield, metres; None for nothing."""
         if not (self.program.provenance.compensation and self.machine.yielding_known):
             return None
@@ -161,14 +161,14 @@ class Replay(Value):
         (position, direction), found = (pose[::2] for pose in self.pose), list[Yielding]()
         for part, rates, accelerations in motion_of_rows(self.program, self.slopes):
             poses = position[part], direction[part]
-            push = leg_pushes(self.machine, *poses, rates, accelerations, weight=self.made_good is None)
+            push = leg_pushes(self.machine, *poses, rates, accelerations, weight=self.compensated_by is None)
             found.append(Yielding.of(self.machine, *poses, push))
         return Yielding(*(np.concatenate([getattr(each, name) for each in found]) for name in vars(found[0])))
 
     @cached_property
     def sag(self) -> Floats:
         """How far loads for which drives compensate would move the tip (N,) at the rows, metres; 0 for none."""
-        return self._moved(self.made_good)
+        return self._moved(self.compensated_by)
 
     @cached_property
     def pushed(self) -> Floats:
@@ -176,10 +176,10 @@ class Replay(Value):
 
         Metres; 0 where that is nothing.
         """
-        if self.made_good is None or self.program.process_force is None:
+        if self.compensated_by is None or self.program.process_force is None:
             return self._moved(None)
         steady = replace(self.program, process_force=None)
-        return self._moved(self.made_good - springs(steady, self.machine, steady.legs))
+        return self._moved(self.compensated_by - springs(steady, self.machine, steady.legs))
 
     def _moved(self, more: Floats | None) -> Floats:
         """Return how far the tip (N,) moves at the rows as legs get shorter by `more` (N, n_legs), metres."""
