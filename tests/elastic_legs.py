@@ -1,7 +1,7 @@
 """The tip of a machine whose legs are springs, by MuJoCo: it knows nothing of our statics."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +11,14 @@ from pentapod.kinematics.families.as_built import AsBuiltPentapod
 from pentapod.kinematics.forces import leg_force_map
 from pentapod.machine import Machine, Stiffness, mjcf
 from pentapod.machine.dynamics.deflection import Yielding, leg_pushes
+from pentapod.machine.rigid_bodies.mjcf import MujocoModelOptions
 from pentapod.program import Program, Provenance
 from pentapod.program.commands import commanded
 from pentapod.program.program import ProcessForce
 
 SPRING = 20e6
+LIGHT = MujocoModelOptions(ring_mass=0.005)
+NO_RINGS = (0.0,) * 5
 
 
 def tip_at_rest(machine, p, i, force, longer=0.0, spring=SPRING):
@@ -25,7 +28,7 @@ def tip_at_rest(machine, p, i, force, longer=0.0, spring=SPRING):
     """
     import mujoco
 
-    xml = mjcf(machine, AsBuiltPentapod.of(machine.robot), p, i, period=1e-3)
+    xml = mjcf(machine, AsBuiltPentapod.of(machine.robot), p, i, period=1e-3, model=LIGHT)
     xml = re.sub(r'kp="[^"]*" kv="[^"]*"', f'kp="{spring}" kv="{0.01 * spring}"', xml)
     model = mujoco.MjModel.from_xml_string(xml)
     data = mujoco.MjData(model)
@@ -41,10 +44,11 @@ def tip_at_rest(machine, p, i, force, longer=0.0, spring=SPRING):
     return data.site_xpos[tip].copy()
 
 
-def deflections(seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def deflections(seed: int, radii: Sequence[float] = NO_RINGS) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield how far the tip is moved in MuJoCo, and by our statics, (3,) metres: by weight, and by a force on it."""
     rng, machine = np.random.default_rng(seed), Machine.load("desk")
-    machine = replace(machine, stiffness=Stiffness(leg_stiffness=np.full(5, SPRING)))
+    robot = AsBuiltPentapod.of(machine.robot, radii=radii)
+    machine = replace(machine, robot=robot, stiffness=Stiffness(leg_stiffness=np.full(5, SPRING)))
     lean = 0.25 * rng.uniform(-1.0, 1.0, 2)
     i = np.array([*lean, np.sqrt(1.0 - lean @ lean)])
     p = machine.work.centre + 0.02 * rng.uniform(-1.0, 1.0, 3) - machine.tool_length * i

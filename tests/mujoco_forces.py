@@ -4,16 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 
+from pentapod.kinematics import AsBuiltPentapod
 from pentapod.kinematics.jacobian import pose_jacobian
 from pentapod.machine import Machine
-from pentapod.machine.rigid_bodies.mjcf import mjcf
+from pentapod.machine.rigid_bodies.mjcf import MujocoModelOptions, mjcf
 
-MACHINES = ("desk", "bench-general", "steep")
+MASSLESS = MujocoModelOptions(ring_mass=1e-10)
+"""Rings have no mass, as in our terms."""
+
+MACHINES = ("desk", "bench-general", "steep", "desk on rings")
+STEPS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
+ONCE, TWICE = (
+    np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0,
+    np.array([2.0, -27.0, 270.0, 270.0, -27.0, 2.0]) / 180.0,
+)
 
 
 def loaded(name: str) -> Machine:
     """A machine with masses that are all felt, gravity along no axis."""
-    machine = Machine.load(name)
+    machine = Machine.load(name.removesuffix(" on rings"))
+    if name.endswith(" on rings"):
+        errors = np.random.default_rng(1).uniform(-2e-4, 2e-4, (5, 3))
+        rings = AsBuiltPentapod.of(machine.robot, base_errors=errors, radii=[0.0, 1e-4, 5e-4, 4e-3, 12e-3])
+        machine = replace(machine, robot=rings)
     masses = replace(machine.masses, cylinder=4.0, rod=2.0, platform=12.0, gravity=np.array([2.0, -3.0, 9.0]))
     drives = replace(machine.drives, moving_mass=[5.0, 20.0, 40.0, 80.0, 100.0])
     return replace(machine, masses=masses, drives=drives)
@@ -31,6 +44,16 @@ def curves(machine: Machine, count: int, seed: int):
     return curve, rng.uniform(0.0, 0.3, count) ** 2, rng.uniform(-5.0, 5.0, count)
 
 
+def moved_ends(robot, p, i, dp, di, ddp, ddi) -> tuple[np.ndarray, np.ndarray]:
+    """First and second derivatives (5, 3) of where the legs end, by differences: rings turn as the base joints ask."""
+    h = 1e-3
+    way = h * STEPS[:, None]
+    axes = i + way * di + 0.5 * way**2 * ddi
+    ends = robot.platform_joints(p + way * dp + 0.5 * way**2 * ddp, axes / np.linalg.norm(axes, axis=1, keepdims=True))
+    middle = robot.platform_joints(p, i) * TWICE.sum()
+    return np.tensordot(ONCE, ends, 1) / h, (np.tensordot(TWICE, ends, 1) - middle) / h**2
+
+
 def by_mujoco(mujoco, machine: Machine, curve, x: float, u: float) -> np.ndarray:
     """Forces (5,) of the drives at one state: inverse dynamics of the open tree, projected on the legs.
 
@@ -38,7 +61,7 @@ def by_mujoco(mujoco, machine: Machine, curve, x: float, u: float) -> np.ndarray
     """
     robot, length = machine.robot, machine.tool_length
     (p, i), (p1, i1), (p2, i2) = ((tip + length * axis, -axis) for tip, axis in curve)
-    model = mujoco.MjModel.from_xml_string(mjcf(machine, robot, p, i, period=1e-3))
+    model = mujoco.MjModel.from_xml_string(mjcf(machine, robot, p, i, period=1e-3, model=MASSLESS))
     data = mujoco.MjData(model)
     turn = np.empty(9)
 
@@ -49,9 +72,11 @@ def by_mujoco(mujoco, machine: Machine, curve, x: float, u: float) -> np.ndarray
     def coordinates(dp, di, ddp, ddi):
         """Velocities and accelerations (nv,) of the joints."""
         rate, second = np.zeros((2, model.nv))
+        ends = moved_ends(robot, p, i, dp, di, ddp, ddi)
         for leg in range(5):
             z, d = robot.offsets[leg], robot.leg_vectors(p, i)[leg]
-            d1, d2 = dp + z * di, ddp + z * ddi
+            on_ring = isinstance(robot, AsBuiltPentapod) and robot.radii[leg] > 0.0
+            d1, d2 = (one[leg] for one in ends) if on_ring else (dp + z * di, ddp + z * ddi)
             n = np.linalg.norm(d)
             e = d / n
             n1 = e @ d1

@@ -16,7 +16,7 @@ from pentapod.geometry import RigidTransform
 from pentapod.job import Job
 from pentapod.job.build.values import job_machine
 from pentapod.job.verdict import judge
-from pentapod.kinematics import Component
+from pentapod.kinematics import AsBuiltPentapod, Component
 from pentapod.machine import Dynamics, LegModel, Machine, Stiffness
 from pentapod.program import Program, Provenance, read_csv, write_csv
 from pentapod.program.commands import SMOOTH_S, commanded, compensation_sentence, read_back
@@ -36,11 +36,15 @@ def machine_of(**more):
 
 SOFT = Stiffness(leg_stiffness=np.array([20e6, 15e6, 30e6, 20e6, 25e6]), joint_stiffness=np.full(5, 80e6))
 AXES = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+RINGS = [1e-4, 0.0, 3e-4, 2e-3, 6e-3]
 MACHINES = {
     "springs": machine_of(stiffness=SOFT),
     "screws": machine_of(stiffness=Stiffness(leg_rigidity=np.full(5, 8e6)), leg_model=LegModel(5e-3, AXES, 1e-5)),
     "heavy": machine_of(
         stiffness=SOFT, masses=replace(Machine.load("desk").masses, platform=20.0, gravity=np.array([1.0, -2.0, 9.5]))
+    ),
+    "calibrated": machine_of(
+        stiffness=SOFT, robot=AsBuiltPentapod.of(Machine.load("desk").robot, radii=RINGS, zeros=3e-4)
     ),
 }
 

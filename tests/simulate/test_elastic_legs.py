@@ -11,9 +11,10 @@ MOST = {("weight", 0.0): 0.02, ("weight and force", 0.0): 0.03, ("weight", 0.2):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("radii", [(0.0,) * 5, (1e-4, 0.0, 1e-3, 4e-3, 12e-3)], ids=["line", "rings"])
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_the_tip_deflects_by_weight_and_force_as_in_mujoco(seed):
-    for expected, found in deflections(seed):
+def test_the_tip_deflects_by_weight_and_force_as_in_mujoco(seed, radii):
+    for expected, found in deflections(seed, radii):
         assert np.linalg.norm(expected) > 3e-6
         assert np.linalg.norm(found - expected) <= 0.01 * np.linalg.norm(expected)
 

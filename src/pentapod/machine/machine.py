@@ -139,12 +139,13 @@ class Machine(Value):
         for key, values in rows.items():
             if len(values) != count:
                 raise MachineError("wrong count", key=key, value=len(values), expected=f"one for each of {count} legs")
-        if self.drive_forces.limited and not self.ends_on_line:
+        if self.drive_forces.limited and not self.leg_forces_known:
             raise MachineError(
-                "forces of the drives are known only where all legs end on the tool's line and nothing else holds it",
+                "forces of the drives are known only where all legs end on the tool's line or on rings around it, and "
+                "nothing else holds it",
                 key="peak_force",
                 value=self.drive_forces.peak_force.tolist(),
-                remedy="leave it out, or describe the machine without arms and rings",
+                remedy="leave it out, or describe the machine without arms and passive limb",
             )
         if self.guides is not None and not isinstance(self.robot, LinearPentapod):
             raise MachineError(
@@ -178,15 +179,14 @@ class Machine(Value):
         return Bars(self.robot, self.limb, self.bodies.leg_radius)
 
     @property
-    def ends_on_line(self) -> bool:
-        """Whether all legs end on the platform line and nothing else holds it: then the forces in them are known."""
-        beside = self.robot.arms.any() or getattr(self.robot, "radii", np.zeros(1)).any()
-        return not beside and self.limb is None
+    def leg_forces_known(self) -> bool:
+        """Whether all legs end on the platform line, or on rings around it, and nothing else holds it."""
+        return not self.robot.arms.any() and self.limb is None
 
     @property
     def yielding_known(self) -> bool:
         """Whether the machine says how far its legs yield, and the forces in them are known."""
-        return self.stiffness.given and self.ends_on_line
+        return self.stiffness.given and self.leg_forces_known
 
     @property
     def line_top(self) -> float:

@@ -53,12 +53,12 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
         raise job.error("feed", "cutting_force_n", what, value=cutting, remedy=remedy)
     weight = job.placement.weight_stiffness
     if weight is not None and not machine.yielding_known:
-        remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
+        remedy = "give stiffness_n_um in [legs] of a machine without arms and passive limb, or leave it out"
         what = "how stiff this machine is at the tip is not known"
         raise job.error("placement", "weight_stiffness", what, value=weight, remedy=remedy)
     deflection = job.tolerance.deflection_mm
     if deflection is not None and not machine.yielding_known:
-        remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
+        remedy = "give stiffness_n_um in [legs] of a machine without arms and passive limb, or leave it out"
         what = "how far the tip deflects is not known on this machine"
         raise job.error("tolerance", "deflection_mm", what, value=deflection, remedy=remedy)
     asked = job.output.compensation
@@ -69,7 +69,7 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
         )
         raise job.error("output", "compensation", what, remedy=remedy)
     if asked not in (None, "none") and not machine.yielding_known:
-        remedy = "give stiffness_n_um in [legs] of a machine whose legs all end on the tool's line, or leave it out"
+        remedy = "give stiffness_n_um in [legs] of a machine without arms and passive limb, or leave it out"
         what = "how far the legs of this machine yield is not known"
         raise job.error("output", "compensation", what, remedy=remedy)
     try:

@@ -33,7 +33,7 @@ class ForceTerms(Value):
 
 @dataclass(frozen=True, eq=False)
 class Dynamics(Value):
-    """Bodies of a machine whose legs end on the platform line, as moments of their masses.
+    """Bodies of a machine whose legs end on the platform line or on rings around it, as moments of their masses.
 
     platform (3,), cylinders, rods (n_legs, 3): mass, first and second moment: of the platform about p along the line,
     of a cylinder about its base joint, of a rod about the platform joint. The tool's spin about the line is free.
@@ -71,22 +71,21 @@ class Dynamics(Value):
 
         tips, axes = np.zeros((2, 3, len(position), 3))
         tips[0], axes[0] = position + self.machine.tool_length * direction, -direction
-        base, offsets, tool = self._robot
-        motion_of_rows(read_only(rates), read_only(accelerations), base, offsets, tool, tips, axes)
+        motion_of_rows(read_only(rates), read_only(accelerations), *self._robot, tips, axes)
         return self._terms(tips, axes, reach)
 
     @property
-    def _robot(self) -> tuple[Floats, Floats, float]:
+    def _robot(self) -> tuple[Floats, Floats, Floats, float]:
         robot = self.machine.robot
-        return read_only(robot.base_joints), read_only(robot.offsets), self.machine.tool_length
+        radii = read_only(np.array(getattr(robot, "radii", np.zeros(robot.n_legs))))
+        return read_only(robot.base_joints), read_only(robot.offsets), radii, self.machine.tool_length
 
     def _terms(self, tips: Floats, axes: Floats, asked: bool) -> ForceTerms:
         from pentapod.machine.dynamics.dynamics_kernels import force_terms  # noqa: PLC0415 - loads numba
 
-        base, offsets, tool = self._robot
         platform, cylinders, rods = read_only(self.platform), read_only(self.cylinders), read_only(self.rods)
         moving, gravity = read_only(self.machine.drives.moving_mass), read_only(self.machine.masses.gravity)
         count = tips.shape[1]
         terms, reach = np.empty((3, count, len(rods))), np.empty((count if asked else 0, len(rods)))
-        force_terms(tips, axes, base, offsets, tool, platform, cylinders, rods, moving, gravity, terms, reach)
+        force_terms(tips, axes, *self._robot, platform, cylinders, rods, moving, gravity, terms, reach)
         return ForceTerms(terms[0], terms[1], terms[2], reach)

@@ -176,7 +176,7 @@ def _expected(times: Floats, legs: Floats, poses: tuple[Floats, Floats], referen
     from scipy.signal import savgol_filter  # noqa: PLC0415  slow to load
 
     machine = reference.machine
-    if not machine.ends_on_line:
+    if not machine.leg_forces_known:
         return None
     period = float(np.median(np.diff(times)))
     even = np.arange(times[0], times[-1] + 0.5 * period, period)

@@ -51,8 +51,11 @@ def deflection(replay: Replay) -> Finding | Idle:
     machine, bound = replay.machine, replay.specification.deflection
     if not machine.stiffness.given:
         return Idle("the machine says nothing of the stiffness of its legs", unknown=bound is not None)
-    if not machine.ends_on_line:
-        return Idle("forces in legs are known only where all end on the tool's line", unknown=bound is not None)
+    if not machine.leg_forces_known:
+        return Idle(
+            "forces in legs are known only where all end on the tool's line or on rings around it",
+            unknown=bound is not None,
+        )
     found, force = replay.yielding, machine.cutting_force
     by_masses = np.linalg.norm(found.shift, axis=1)
     by_cutting = np.maximum(force * found.softest * replay.cuts(), replay.pushed) if force else replay.pushed

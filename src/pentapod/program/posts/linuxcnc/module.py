@@ -132,14 +132,13 @@ def _as_it_is(machine: Machine) -> dict[str, ArrayLike]:
     robot = machine.robot if isinstance(machine.robot, AsBuiltPentapod) else nominal_robot(machine)
     base, offsets = 1e3 * robot.base_joints, 1e3 * robot.offsets
     # Half a squared length is q/2 - b . p + o p . i - o b . i + (b . b + o o)/2.
-    known = np.column_stack([np.ones(5), -base[:, :2], -offsets[:, None] * base[:, :2]])
+    known = np.column_stack([np.ones_like(offsets), -base[:, :2], -offsets[:, None] * base[:, :2]])
     rest = np.column_stack([-offsets, base[:, 2], offsets * base[:, 2]])
-    of_all = np.linalg.solve(known, np.column_stack([np.eye(5), -0.5 * ((base**2).sum(axis=1) + offsets**2), rest]))
+    constant = -0.5 * ((base**2).sum(axis=1) + offsets**2)
+    inverse = np.linalg.inv(known)
     return {
-        "OF_SQUARES": of_all[:, :6], "OF_THREE": of_all[:, 6:],
-        "BASE": 1e3 * robot.base_joints.T,
-        "OFFSET": 1e3 * robot.offsets, "RING": 1e3 * robot.radii,
-        "ZERO": 1e3 * robot.zeros,
+        "OF_SQUARES": np.column_stack([inverse, inverse @ constant]), "OF_THREE": inverse @ rest,
+        "BASE": base.T, "OFFSET": offsets, "RING": 1e3 * robot.radii, "ZERO": 1e3 * robot.zeros,
     }  # fmt: skip
 
 
