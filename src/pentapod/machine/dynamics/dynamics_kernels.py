@@ -200,7 +200,7 @@ def force_terms(
             for n in range(3):
                 terms[n, k, leg] += r[leg, n]
             if len(reach):
-                reach[k, leg] = np.sqrt(r[leg, 3] ** 2 + r[leg, 4] ** 2 + r[leg, 5] ** 2)
+                reach[k, leg] = np.sqrt((r[leg, 3:] ** 2).sum())
 
 
 @kernel
