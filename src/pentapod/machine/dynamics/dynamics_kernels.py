@@ -141,6 +141,16 @@ def _spread(
 
 
 @kernel
+def _largest(r: Floats, reach: Floats) -> None:
+    """Fill reach (5,) with the largest force of each leg for 1 N on the tip, from the last columns of r (5, 6)."""
+    for leg in range(LEGS):
+        square = 0.0
+        for c in range(3):
+            square += r[leg, 3 + c] * r[leg, 3 + c]
+        reach[leg] = np.sqrt(square)
+
+
+@kernel
 def force_terms(
     tips: Floats,
     axes: Floats,
@@ -199,8 +209,8 @@ def force_terms(
         for leg in range(LEGS):
             for n in range(3):
                 terms[n, k, leg] += r[leg, n]
-            if len(reach):
-                reach[k, leg] = np.sqrt((r[leg, 3:] ** 2).sum())
+        if len(reach):
+            _largest(r, reach[k])
 
 
 @kernel
