@@ -11,8 +11,13 @@ from collections.abc import Callable, Iterable, Iterator, Sized
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextvars import copy_context
 from functools import wraps
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
+import numpy.typing as npt
+
+from pentapod.numerics.blocks import blocks
+
+Array = npt.NDArray[Any]
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 _P = ParamSpec("_P")
@@ -57,6 +62,26 @@ def in_threads(
         finally:
             for future in begun:
                 future.cancel()
+
+
+ROWS = 2048
+"""Rows that a thread takes at a time: some milliseconds of a kernel that searches a mesh for each."""
+
+
+def for_rows(
+    kernel: Callable[..., object], rows: tuple[Array, ...], given: tuple[object, ...], filled: tuple[Array, ...]
+) -> None:
+    """Call kernel(*rows, *given, *filled) with blocks of the rows, and of the rows that it fills, on all cores.
+
+    The blocks do not depend on the number of threads. So what is filled does not either, even where a row begins with
+    what the one before it in its block has found.
+    """
+
+    def done(k: slice) -> None:
+        kernel(*(array[k] for array in rows), *given, *(array[k] for array in filled))
+
+    for _ in in_threads(done, list(blocks(len(filled[0]), ROWS))):
+        pass
 
 
 def on_one_thread(function: Callable[_P, _R]) -> Callable[_P, _R]:

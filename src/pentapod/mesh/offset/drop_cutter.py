@@ -10,6 +10,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.mesh.query.tree import FacetTree
+from pentapod.numerics.threads import for_rows
 
 
 def drop_cutter(tree: FacetTree, places: Floats, radius: float, disc: float = 0.0) -> Floats:
@@ -21,5 +22,6 @@ def drop_cutter(tree: FacetTree, places: Floats, radius: float, disc: float = 0.
     from pentapod.mesh.offset.drop_kernels import drop_all  # noqa: PLC0415 - loads numba
 
     heights, touches = np.empty(len(places)), np.empty((len(places), 4))
-    drop_all(np.ascontiguousarray(places), radius, disc, tree.corners, tree.starts, tree.extents, heights, touches)
+    given = (radius, disc, tree.corners, tree.starts, tree.extents)
+    for_rows(drop_all, (np.ascontiguousarray(places),), given, (heights, touches))
     return heights

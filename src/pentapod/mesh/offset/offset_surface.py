@@ -25,6 +25,7 @@ from pentapod.base.errors import MeshError
 from pentapod.mesh.offset.dual_contouring import Crossings, Grid, dual_contour
 from pentapod.mesh.offset.refinement import Edges, Nodes, divided, indices, missed_cells
 from pentapod.mesh.query.tree import FacetTree
+from pentapod.numerics.threads import for_rows
 
 MOST_NODES, MOST_BLOCKS = 30_000_000, 60_000_000
 _BLOCK, _GROUP = 4, 8
@@ -124,7 +125,8 @@ def _contour(tree: FacetTree, nodes: Nodes, blocks: _Blocks, wide: Bools, distan
     starts = cells.grid.points(nodes.keys[rows])
     points, normals = np.empty_like(starts), np.empty_like(starts)
     metres = (cells.grid.step * lengths).astype(np.float64)
-    cross_level(starts, axes, metres, distance, tree.corners, tree.starts, tree.extents, points, normals)
+    given = (distance, tree.corners, tree.starts, tree.extents)
+    for_rows(cross_level, (starts, axes, metres), given, (points, normals))
     crossings = Crossings(nodes.keys[rows], axes, lengths, outside[rows], points, normals)
     vertices, triangles, _ = dual_contour(cells, nodes.keys, outside, crossings)
     return onto_level(tree, vertices, distance, _ROUNDS, _ON_LEVEL)[0], triangles
@@ -142,7 +144,8 @@ def onto_level(
     from pentapod.mesh.offset.level_kernels import move_onto_level  # noqa: PLC0415  loads numba
 
     points, gaps = np.array(points, dtype=np.float64), np.empty(len(points))
-    move_onto_level(points, distance, rounds, accuracy * distance, tree.corners, tree.starts, tree.extents, gaps)
+    given = (distance, rounds, accuracy * distance, tree.corners, tree.starts, tree.extents)
+    for_rows(move_onto_level, (points,), given, (gaps,))
     return points, gaps
 
 

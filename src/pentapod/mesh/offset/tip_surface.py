@@ -16,6 +16,7 @@ from pentapod.geometry.runs import members
 from pentapod.mesh.normals import unit_or_zero
 from pentapod.mesh.offset.dual_contouring import Cells, Crossings, Grid, dual_contour
 from pentapod.mesh.query.tree import FacetTree
+from pentapod.numerics.threads import for_rows
 
 MOST_NODES = 30_000_000
 _SHIFT = np.array([0.3819660, 0.2679492, 0.4142136])
@@ -56,7 +57,8 @@ class Lowered:
         from pentapod.mesh.offset.drop_kernels import drop_all  # noqa: PLC0415  loads numba
 
         heights, touches = np.empty(len(places)), np.full((len(places), 4), np.nan)
-        drop_all(np.ascontiguousarray(places), self.radius, self.disc, *self._hierarchy, heights, touches)
+        given = (self.radius, self.disc, *self._hierarchy)
+        for_rows(drop_all, (np.ascontiguousarray(places),), given, (heights, touches))
         return heights, touches
 
     def meets(self, tips: Floats) -> Bools:
@@ -64,7 +66,7 @@ class Lowered:
         from pentapod.mesh.offset.tip_kernels import all_met  # noqa: PLC0415  loads numba
 
         met = np.empty(len(tips), dtype=np.intp)
-        all_met(self._raised(tips), self.radius, self.disc, *self._hierarchy, met)
+        for_rows(all_met, (self._raised(tips),), (self.radius, self.disc, *self._hierarchy), (met,))
         return met > 0
 
     def settled(self, tips: Floats, towards: Floats, reach: float, accuracy: float) -> tuple[Floats, Bools]:
@@ -72,7 +74,8 @@ class Lowered:
         from pentapod.mesh.offset.tip_kernels import settle  # noqa: PLC0415  loads numba
 
         points, held = self._raised(tips), np.empty(len(tips), dtype=np.intp)
-        settle(points, np.ascontiguousarray(towards), reach, accuracy, self.radius, self.disc, *self._hierarchy, held)
+        given = (reach, accuracy, self.radius, self.disc, *self._hierarchy)
+        for_rows(settle, (points, np.ascontiguousarray(towards)), given, (held,))
         return points - [0.0, 0.0, self.radius], held > 0
 
     def surface(self, step: float) -> tuple[Floats, Ints]:
@@ -121,7 +124,8 @@ class Lowered:
             axes = np.full(len(keys), axis)
             lengths = np.where(out, -grid.step, grid.step)
             points, sides = np.empty_like(starts), np.empty_like(starts)
-            cross_tips(starts, axes, lengths, _HALVINGS, self.radius, self.disc, *self._hierarchy, points, sides)
+            given = (_HALVINGS, self.radius, self.disc, *self._hierarchy)
+            for_rows(cross_tips, (starts, axes, lengths), given, (points, sides))
             points[:, 2] -= self.radius
             found.append((keys, axes, out, points, sides))
         keys = np.concatenate([each[0] for each in found])

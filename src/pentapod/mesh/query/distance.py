@@ -20,6 +20,7 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.normals import unit_or_zero
 from pentapod.mesh.query.swept_depth import TouchingBody, touch
 from pentapod.mesh.query.tree import FacetTree
+from pentapod.numerics.threads import for_rows
 
 TOOL_RESOLUTION_M = 1e-6
 """Gaps of tools are exact to this."""
@@ -179,7 +180,8 @@ class MeshDistance:
         facet = np.full(count, -1, dtype=np.intp)
         tree = self.tree
         points, travels = np.ascontiguousarray(starts), np.ascontiguousarray(travels)
-        nearest_all(points, travels, tree.corners, tree.boxes, tree.starts, within, True, distance, where, facet)
+        given = (tree.corners, tree.boxes, tree.starts, within, True)
+        for_rows(nearest_all, (points, travels), given, (distance, where, facet))
         offset = np.where(facet[:, None] >= 0, starts + where[:, :1] * travels - where[:, 1:], 0.0)
         return distance, where[:, 0], offset, facet
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -13,6 +14,7 @@ from pentapod.base.progress import Progress, silent
 from pentapod.geometry.directions import angle_between, tangent_frame
 from pentapod.geometry.solids import KINDS, Solid
 from pentapod.mesh.query.tree import FacetTree
+from pentapod.numerics.threads import for_rows
 
 RESOLUTION_M = 5e-7
 """Depths are exact to this and one per cent."""
@@ -131,10 +133,10 @@ def _met(tree: FacetTree, solids: tuple[Solid, ...], motions: Floats, tilt_centr
         found = (np.empty(len(rows)), np.empty((len(rows), 4)), np.empty(len(rows), dtype=np.intp))
         if solid.is_ball and solid.low == tilt_centre:
             centres, travels = (np.ascontiguousarray(motions[rows, at : at + 3]) for at in (0, 6))
-            nearest_all(centres, travels, *hierarchy, solid.rounding - threshold, False, *found)
+            for_rows(nearest_all, (centres, travels), (*hierarchy, solid.rounding - threshold, False), found)
         else:
-            numbers = np.array(solid.numbers)
-            sweep_all(numbers, motions[rows], *hierarchy, threshold, RESOLUTION_M, -np.inf, *found)
+            given = (*hierarchy, threshold, RESOLUTION_M, -np.inf)
+            for_rows(partial(sweep_all, np.array(solid.numbers)), (motions[rows],), given, found)
         met[rows] = found[2] >= 0
     return met
 
@@ -187,10 +189,11 @@ def _swept(
             found = (depths[k, rows], where[k, rows], facets[k, rows])
             if ball:
                 centres, travels = (np.ascontiguousarray(motions[rows, at : at + 3]) for at in (0, 6))
-                nearest_all(centres, travels, *hierarchy, solid.rounding - threshold, False, *found)
+                for_rows(nearest_all, (centres, travels), (*hierarchy, solid.rounding - threshold, False), found)
                 depths[k, rows] = np.where(facets[k, rows] < 0, -np.inf, solid.rounding - depths[k, rows])
             else:
-                sweep_all(numbers, motions[rows], *hierarchy, threshold, resolution, enough, *found)
+                given = (*hierarchy, threshold, resolution, enough)
+                for_rows(partial(sweep_all, numbers), (motions[rows],), given, found)
     kinds = np.array([KINDS.index(solid.kind) for solid in solids], dtype=np.intp)
     return _by_kind(depths, where, np.where(facets < 0, -1, tree.facets[facets]), kinds)
 

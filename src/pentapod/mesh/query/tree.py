@@ -15,6 +15,7 @@ import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints, read_only
 from pentapod.mesh.mesh import Mesh
+from pentapod.numerics.threads import for_rows
 
 FACETS_PER_LEAF = 4
 """Facets below each leaf, about: few make the tree deep, many make leaves slow."""
@@ -71,8 +72,8 @@ class FacetTree:
 
         distances, away = np.empty(len(points)), np.empty((len(points), 3))
         facets = np.empty(len(points), dtype=np.intp)
-        given = (read_only(points), within, self.corners, self.starts, self.extents)
-        closest_of_all(*given, distances, away, facets)
+        given = (within, self.corners, self.starts, self.extents)
+        for_rows(closest_of_all, (read_only(points),), given, (distances, away, facets))
         return distances, away, facets
 
     def within(self, points: Floats, distance: float) -> Bools:
@@ -80,7 +81,8 @@ class FacetTree:
         from pentapod.mesh.query.segment_kernels import all_within  # noqa: PLC0415 - loads numba
 
         found = np.empty(len(points), dtype=np.bool_)
-        all_within(np.ascontiguousarray(points), distance, self.corners, self.starts, self.extents, found)
+        given = (distance, self.corners, self.starts, self.extents)
+        for_rows(all_within, (np.ascontiguousarray(points),), given, (found,))
         return found
 
     def clear(self, starts: Floats, ends: Floats, least: float) -> Bools:
@@ -89,9 +91,8 @@ class FacetTree:
 
         count = len(starts)
         distances, where, facets = np.empty(count), np.empty((count, 4)), np.empty(count, dtype=np.intp)
-        nearest_all(
-            starts, ends - starts, self.corners, self.boxes, self.starts, least, False, distances, where, facets
-        )
+        given = (self.corners, self.boxes, self.starts, least, False)
+        for_rows(nearest_all, (starts, ends - starts), given, (distances, where, facets))
         return facets < 0
 
 
