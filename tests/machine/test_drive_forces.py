@@ -63,7 +63,7 @@ def test_wrong_forces_are_one_line_with_their_key(drives: str, key: str) -> None
     assert "\n" not in str(caught.value)
 
 
-def test_forces_are_for_machines_whose_legs_end_on_the_line() -> None:
+def test_forces_are_not_for_machines_with_arms() -> None:
     hexa = (resources.files("pentapod.machine") / "library" / "hexa.toml").read_text(encoding="utf-8")
     with pytest.raises(MachineError, match=r"peak_force_n.*end on the tool's line"):
         read_machine(f"{hexa}\n[drives]\npeak_force_n = 900\n", "hexa.toml")

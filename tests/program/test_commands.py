@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,11 @@ from pentapod.cli.commands.new import dome_stl
 from pentapod.cli.main import run
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job
-from pentapod.job.build.values import job_machine
+from pentapod.job.build.values import is_compensated, job_machine
 from pentapod.job.verdict import judge
 from pentapod.kinematics import AsBuiltPentapod, Component
 from pentapod.machine import Dynamics, LegModel, Machine, Stiffness
+from pentapod.machine.calibration.record import CalibrationRecord, MeasuredGeometry
 from pentapod.program import Program, Provenance, read_csv, write_csv
 from pentapod.program.commands import SMOOTH_S, commanded, compensation_sentence, read_back
 from pentapod.program.joined import joined
@@ -266,7 +268,22 @@ def test_compensation_is_asked_for_in_the_job(make_job):
         job_machine(desk.with_(**{"output.compensation": "gravity"}))
 
 
-def test_a_process_force_of_the_job_is_made_good_on_its_cuts(soft_job, tmp_path, capsys):
+def test_a_calibrated_machine_compensates_only_if_the_job_asks(make_job):
+    """The calibration may have taken for geometry what legs yield to weight."""
+    job = Job.load(make_job())
+    soft = machine_of(stiffness=SOFT)
+    robot = AsBuiltPentapod.of(soft.robot, radii=RINGS)
+    geometry = MeasuredGeometry(robot.base, robot.offsets, robot.radii, robot.zeros)
+    calibrated = replace(soft, robot=robot, calibration=CalibrationRecord("desk", "", date(2026, 1, 31), geometry))
+    for asked, on in ((None, False), ("none", False), ("gravity", True)):
+        assert is_compensated(job.with_(**{"output.compensation": asked}), calibrated) == on
+        assert is_compensated(job.with_(**{"output.compensation": asked}), soft) == (asked != "none")
+    said = compensation_sentence(program_of(calibrated, compensation=""), calibrated)
+    assert said.startswith("drives do not compensate for the weight")
+    assert compensation_sentence(program_of(soft, compensation=""), soft) == ""
+
+
+def test_a_process_force_of_the_job_is_compensated_for_on_its_cuts(soft_job, tmp_path, capsys):
     text = (soft_job / "job.toml").read_text(encoding="utf-8")
     assert "[feed]\n" in text
     text = text.replace("[feed]\n", "[feed]\ncutting_force_n = 30\n") + '\n[output]\ncompensation = "process"\n'
@@ -284,7 +301,7 @@ def test_a_process_force_of_the_job_is_made_good_on_its_cuts(soft_job, tmp_path,
 
 
 @pytest.mark.slow
-def test_legs_keep_their_limits_where_what_is_made_good_moves_them_too(soft_job, tmp_path):
+def test_legs_keep_their_limits_where_compensation_moves_them_too(soft_job, tmp_path):
     """Very soft legs and a large force: the first time law is made for the legs alone, and the drives would exceed."""
     machine = (soft_job / "soft.toml").read_text(encoding="utf-8")
     assert "stiffness_n_um = 20\n" in machine

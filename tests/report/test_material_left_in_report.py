@@ -1,5 +1,7 @@
 """The map of what the cutter leaves: heights against balls at the program's rows, and what the page shows of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -11,6 +13,7 @@ from pentapod.mesh import Mesh
 from pentapod.program import Program
 from pentapod.report import write_report
 from pentapod.toolpath import Toolpath
+from pentapod.verify.verdict.material_left import MaterialLeft
 from pentapod.view.opened_run import open_run
 from pentapod.view.stored import placed_path, stored_outcome
 from usual_job import job_text
@@ -63,6 +66,29 @@ def test_points_are_spread_evenly_over_the_region(planned):
     assert side.mean() == pytest.approx(areas, abs=2e-3)
     nearest = cKDTree(points).query(points, k=2)[0][:, 1]
     assert nearest.max() < 3.0 * np.sqrt(mesh.facet_areas.sum() / len(points))
+
+
+def test_a_spot_is_shown_where_the_path_passes_it(planned, tmp_path):
+    """A spot of 4 mm on the top of the part: the keys that tell it are beside it, and none is far away."""
+    _, outcome = planned
+    left, program, toolpath = outcome.verdict.left, outcome.find(Program), outcome.find(Toolpath)
+    spot = left.points[left.points[:, 2].argmax()]
+    heights = np.where(np.linalg.norm(left.points - spot, axis=1) < 4e-3, 1e-3, 0.0)
+    verdict = replace(outcome.verdict, left=MaterialLeft(left.points, heights, left.allowed, left.far))
+    shown = replace(outcome, verdict=verdict)
+    arrays = page_arrays(write_report(shown, tmp_path / "report.html").read_text(encoding="utf-8"))
+    times, told = arrays["key.time"][:, 0], arrays["key.left"][:, 0] > 0.5
+    position, direction = outcome.machine.robot.pose(program.legs, program.component)
+    along = outcome.machine.tool_length - toolpath.tilt_centre
+    far = np.linalg.norm(program.placement.inverse().apply(position + along * direction) - spot, axis=1)
+    key = np.searchsorted(times, program.times + 1e-9) - 1
+    beside = np.unique(key[far < RADIUS + 1e-3])
+    assert len(beside) > 2
+    assert told[beside].all()
+    assert 0 < told.sum() < 0.1 * len(told)
+    # No farther than the spot's edge, half of the distance between passes, and a stretch between keys.
+    nearest = np.array([far[key == k].min(initial=np.inf) for k in np.flatnonzero(told)])
+    assert nearest.max() < RADIUS + 9e-3
 
 
 def test_the_page_colours_the_path_by_it_and_so_does_a_run_read_back(planned, tmp_path):

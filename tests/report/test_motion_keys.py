@@ -102,12 +102,12 @@ def test_rows_that_are_kept_hold_the_others():
     assert np.linalg.norm(between - points, axis=1).max() < 1.0001e-3
 
 
-@pytest.mark.parametrize("made_good", ["gravity", "none"])
-def test_keys_tell_forces_and_deflection_as_the_verdict_does(make_job, tmp_path, made_good):
+@pytest.mark.parametrize("compensation", ["gravity", "none"])
+def test_keys_tell_forces_and_deflection_as_the_verdict_does(make_job, tmp_path, compensation):
     text = (resources.files("pentapod.machine") / "library" / "desk.toml").read_text(encoding="utf-8")
     text = text.replace("min_length_mm", "stiffness_n_um = 20\nmin_length_mm", 1) + "\n[drives]\npeak_force_n = 300\n"
     (tmp_path / "soft.toml").write_text(text, encoding="utf-8")
-    job = Job.load(make_job(('name = "desk"', 'file = "soft.toml"'))).with_(**{"output.compensation": made_good})
+    job = Job.load(make_job(('name = "desk"', 'file = "soft.toml"'))).with_(**{"output.compensation": compensation})
     outcome = run(job, tmp_path / "out")
     assert outcome.passed
     page = write_report(outcome, tmp_path / "report.html").read_text(encoding="utf-8")

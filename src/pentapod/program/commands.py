@@ -54,6 +54,8 @@ MOST_OF_IT = 0.97
 
 NO_LEG_MODEL = LegModel()
 
+NOT_COMPENSATED = "drives do not compensate for the weight: the calibration may have taken it for geometry"
+
 ROWS_AT_ONCE = 1 << 15
 """Rows that are computed together, which bounds the memory."""
 
@@ -61,7 +63,8 @@ ROWS_AT_ONCE = 1 << 15
 def compensation_sentence(program: Program, machine: Machine) -> str:
     """Return what drives compensate for, and by how much their lengths differ from the program's; "" for nothing."""
     if not program.provenance.compensation:
-        return ""
+        asks = machine.calibration is not None and machine.yielding_known
+        return NOT_COMPENSATED if asks else ""
     most = 1e6 * float(np.abs(springs(program, program.machine(machine), program.legs)).max())
     process = ""
     if (force := program.process_force) is not None:

@@ -126,6 +126,17 @@ def test_feed_is_what_keeps_the_legs_in_their_rates_at_the_speed_that_is_asked_f
 
 
 @compiled
+def test_feed_falls_back_on_what_is_too_fast_now_where_the_speeds_are_not_connected(tmp_path):
+    machine = Machine.load("desk")
+    module = Compiled(machine, tmp_path)
+    legs, _ = module.inverses(np.linspace(0.0, 1.0, 100)[:, None] * [120.0, 80.0, 0.0, 0.0, 0.0])
+    _, feed = module.guarded(legs, True, -1.0, np.full(7, -np.inf), np.full(5, 1e9))
+    rates = np.abs(np.diff(legs, axis=0) / 1e-3 / (MM * machine.legs.max_velocity)).max(axis=1)
+    assert rates.min() > 1.5
+    assert np.abs(feed[1:] - 1.0 / rates).max() < 1e-9
+
+
+@compiled
 def test_world_comes_back(tmp_path):
     machine = calibrated(5)
     module = Compiled(machine, tmp_path)

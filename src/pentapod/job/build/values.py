@@ -81,8 +81,12 @@ def job_machine(job: Job, machine: Machine | None = None) -> Machine:
 
 
 def is_compensated(job: Job, machine: Machine) -> bool:
-    """Return whether drives compensate for what legs yield to weight; machine: that of the job."""
-    return job.output.compensation != "none" and machine.yielding_known
+    """Return whether drives compensate for what legs yield to weight; machine: that of the job.
+
+    A calibration has found shorter legs where the weight makes them shorter: there it must be asked for.
+    """
+    asked = job.output.compensation
+    return machine.yielding_known and (machine.calibration is None if asked is None else asked != "none")
 
 
 def job_mesh(job: Job, progress: Progress = silent) -> Mesh:

@@ -189,7 +189,7 @@ class OutputKeys:
             "",
             "loads that drives compensate for, because legs yield to them: gravity, or gravity and "
             "feed.cutting_force_n against the motion on cuts (process); gravity when left out, on machines that give "
-            "the stiffness of their legs",
+            "the stiffness of their legs and have no calibration",
         ),
     ] = None
 

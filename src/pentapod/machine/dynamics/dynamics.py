@@ -11,6 +11,7 @@ from pentapod.base.arrays import Floats, read_only
 from pentapod.base.values import Value
 from pentapod.machine.machine import Machine
 from pentapod.machine.rigid_bodies.capsules import leg_cylinder, leg_rod, spindle
+from pentapod.machine.rigid_bodies.frames import ring_radii
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +78,8 @@ class Dynamics(Value):
     @property
     def _robot(self) -> tuple[Floats, Floats, Floats, float]:
         robot = self.machine.robot
-        radii = read_only(np.array(getattr(robot, "radii", np.zeros(robot.n_legs))))
-        return read_only(robot.base_joints), read_only(robot.offsets), radii, self.machine.tool_length
+        rings = read_only(ring_radii(robot))
+        return read_only(robot.base_joints), read_only(robot.offsets), rings, self.machine.tool_length
 
     def _terms(self, tips: Floats, axes: Floats, asked: bool) -> ForceTerms:
         from pentapod.machine.dynamics.dynamics_kernels import force_terms  # noqa: PLC0415 - loads numba

@@ -69,7 +69,7 @@ def _of_leg(
 
     Rows: A, B and G. d (3, 3): the leg's vector and its derivatives; u (3, 3): filled with its direction and theirs.
     """
-    square, along, bend, fast, weight = 0.0, 0.0, 0.0, 0.0, 0.0
+    square, along, curl, fast, weight = 0.0, 0.0, 0.0, 0.0, 0.0
     for c in range(3):
         square += d[0, c] * d[0, c]
     length = np.sqrt(square)
@@ -78,15 +78,15 @@ def _of_leg(
         along += u[0, c] * d[1, c]
     for c in range(3):
         u[1, c] = (d[1, c] - along * u[0, c]) / length
-        bend += u[1, c] * d[1, c] + u[0, c] * d[2, c]
+        curl += u[1, c] * d[1, c] + u[0, c] * d[2, c]
         fast += u[1, c] * u[1, c]
         weight += gravity[c] * u[0, c]
     for c in range(3):  # the part of u″ across the leg: along it, it is −|u′|²
-        u[2, c] = (d[2, c] - bend * u[0, c] - 2.0 * along * u[1, c]) / length + fast * u[0, c]
+        u[2, c] = (d[2, c] - curl * u[0, c] - 2.0 * along * u[1, c]) / length + fast * u[0, c]
     once = rod[1] + rod[0] * length
     twice = cylinder[2] + rod[2] + (2.0 * rod[1] + rod[0] * length) * length
     own[0] = (moving + rod[0]) * along
-    own[1] = (moving + rod[0]) * bend - once * fast
+    own[1] = (moving + rod[0]) * curl - once * fast
     own[2] = -rod[0] * weight
     for c in range(3):
         side[0, c] = twice / length * u[1, c]

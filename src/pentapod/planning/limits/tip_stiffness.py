@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from pentapod.kinematics.arithmetic import NUMPY, dot
-from pentapod.kinematics.legs_on_rings import LegsOnRings
+from pentapod.machine.rigid_bodies.frames import ring_radii
 from pentapod.planning.limits.limit import Group, LimitKind, Scene
 from pentapod.planning.limits.tool_pose import ToolPose
 
@@ -47,15 +47,14 @@ class TipStiffness:
         fixed = 1.0 / springs.leg_stiffness + 1.0 / springs.joint_stiffness
         by_length = 1.0 / springs.leg_rigidity
         moving, both, turning = _zeros(), _zeros(), _zeros()
-        lever2, robot = 0.0, pose.machine.robot
-        radii = robot.radii.tolist() if isinstance(robot, LegsOnRings) else [0.0] * robot.n_legs
+        lever2, rings = 0.0, ring_radii(pose.machine.robot)
         for k, vector in enumerate(pose.vectors):
             length = pose.lengths[k]
             unit = [vector[j] / length for j in range(3)]
             stiffness = 1.0 / (fixed[k] + by_length[k] * length)
             lever = pose.heights[k] - pose.machine.tool_length
             turn = [lever * value for value in _cross(pose.direction, unit)]
-            if radii[k]:  # the joint is beside the line
+            if rings[k] > 0.0:  # the joint is beside the line
                 beside = _cross(unit, pose.arm(k))
                 turn = [turn[j] + beside[j] for j in range(3)]
             _add(moving, stiffness, unit, unit)

@@ -17,6 +17,7 @@ from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.report.figure import DETAIL
 from pentapod.report.pack import Packed
 from pentapod.report.page.causes import KINDS, kind_of
+from pentapod.report.page.left_along import left_at, marked_along
 from pentapod.report.signals import Signals
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.replay.free_space import PosedPolyline
@@ -115,6 +116,8 @@ class Keys:
         far = 1e3 * (machine.tool_length - machine.line_top)
         shown = np.concatenate([1e3 * tips, far * axes, 1e3 * joints.reshape(len(tips), -1)], axis=1)
         must = _marked(signals)
+        if left is not None:
+            must |= marked_along(signals)
         rows = straight_rows(signals.times, shown, must, OPTIONS.straight_mm)
         least = np.interp(signals.times, signals.times[signals.margin_rows], signals.smallest_margins)
         at = np.clip(np.searchsorted(signals.margin_rows, _lowest(least, rows)), 0, len(signals.margin_rows) - 1)
@@ -127,7 +130,7 @@ class Keys:
             np.linalg.norm(loads, axis=-1).max(axis=-1),
             _pushes(signals, rows),
             None if signals.deflections is None else np.maximum.reduceat(signals.deflections[:, 0], rows),
-            None if left is None else _left(signals, placed, rows, left),
+            None if left is None else left_at(signals, placed, rows, left),
         )  # fmt: skip
 
     def pack(self, packed: Packed, signals: Signals, kinds: Sequence[SegmentKind], period: float) -> None:
@@ -176,29 +179,9 @@ class Keys:
             words = f"{most:.3g} µm, {'the largest' if deflection is None else 'as much as is allowed'}"
             scales.append(_scale("deflection of the tip", "key.deflection", " µm", most, 0.0, (words, "0 µm")))
         if self.left is not None and left is not None:
-            words = (f"{1e3 * left:.3g} mm or more: too much", f"{5e2 * left:.3g}", "0 mm")
+            words = (f"{1e3 * left:.3g} mm, as much as is allowed, or more", f"{5e2 * left:.3g}", "0 mm")
             scales.append(_scale("material left", "key.left", " mm", 1e3 * left, 0.0, words))
         return scales
-
-
-def _left(signals: Signals, placed: PlacedPath, rows: Ints, left: MaterialLeft) -> Floats:
-    """Return the largest height (K,) of what is left at the points of the surface that are nearest to each key.
-
-    Where no point is nearest to a key, it is that of the point nearest to it.
-    """
-    from scipy.spatial import KDTree  # noqa: PLC0415  only where there is such a map
-
-    centres = placed.placement.transform.inverse().apply(
-        signals.tips[rows] + placed.toolpath.tilt_centre * signals.axes[rows]
-    )
-    heights = left.heights[KDTree(left.points).query(centres)[1]]
-    cuts = np.flatnonzero(signals.cutting[rows])
-    if len(cuts):
-        nearest = cuts[KDTree(centres[cuts]).query(left.points)[1]]
-        most = np.full(len(rows), -np.inf)
-        np.maximum.at(most, nearest, left.heights)
-        heights = np.where(np.isfinite(most), most, heights)
-    return np.asarray(heights, dtype=np.float64)
 
 
 def _pushes(signals: Signals, rows: Ints) -> Floats | None:

@@ -26,6 +26,7 @@ def machine(replay: Replay) -> Finding:
             read_back(replay.program, judged)
         except InputError as error:
             return Finding.without_value(False, f"header: {error}")
+        return Finding.without_value(False, "header: the rows are commands of drives")
     if made_for.compensation and not judged.yielding_known:
         return Finding.without_value(
             False, f"header: compensation of {made_for.compensation}, but the machine does not say how far legs yield"

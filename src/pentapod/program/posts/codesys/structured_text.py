@@ -1,7 +1,7 @@
 """Structured Text of a machine: a function block with CartesianToAxes and AxesToCartesian, with the module's numbers.
 
-The mathematics is that of the LinuxCNC module, in the language of IEC 61131-3. Numbers are decimal with 17 digits, so
-that a controller reads them exactly.
+Kinematics and margins are those of the LinuxCNC module, in the language of IEC 61131-3. Numbers are decimal with 17
+digits, so that a controller reads them exactly.
 """
 
 from __future__ import annotations

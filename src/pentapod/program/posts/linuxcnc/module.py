@@ -23,6 +23,7 @@ from pentapod.kinematics.forward.quadratic import LinearPart
 from pentapod.kinematics.robot import Branch, own_branch
 from pentapod.machine.clearance.collision_world import spindle_ends
 from pentapod.machine.machine import Machine
+from pentapod.machine.rigid_bodies.frames import ring_radii
 from pentapod.planning.limits.leg_pairs import LegPairClearance
 from pentapod.planning.limits.limit import Scene
 from pentapod.planning.limits.platform_joints import PlatformJointAngle
@@ -107,7 +108,7 @@ def module_names(given: Module) -> dict[str, str]:
         "NAME": name.replace("\\", ""), "DIGEST": machine.digest, "COMPONENT": str(component), "VERSION": __version__,
         "DIGEST_HIGH": machine.digest[:8], "DIGEST_LOW": machine.digest[8:],
         "AS_BUILT": str(int(isinstance(machine.robot, AsBuiltPentapod))),
-        "RINGS": str(int(bool(np.any(getattr(machine.robot, "radii", 0.0))))),
+        "RINGS": str(int(ring_radii(machine.robot).any())),
     }  # fmt: skip
 
 

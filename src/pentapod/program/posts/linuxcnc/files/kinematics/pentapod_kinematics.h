@@ -46,8 +46,10 @@ static const double PENTAPOD_OFFSET[PENTAPOD_LEGS] = @OFFSET@;
 #if PENTAPOD_AS_BUILT
 static const double PENTAPOD_RING[PENTAPOD_LEGS] = @RING@;
 static const double PENTAPOD_ZERO[PENTAPOD_LEGS] = @ZERO@;
-/* Without rings: q/2, x, y, u, v of half the five squared lengths, and the constant; what p . i, z, w add to them. */
+#if !PENTAPOD_RINGS
+/* q/2, x, y, u, v of half the five squared lengths, and the constant; what p . i, z, w add to them. */
 static const double PENTAPOD_OF_SQUARES[5][6] = @OF_SQUARES@, PENTAPOD_OF_THREE[5][3] = @OF_THREE@;
+#endif
 #endif
 
 /* Machine frame to the controller's: turn each axis (1 or -1), then shift. */
@@ -420,8 +422,8 @@ static inline int pentapod_newton(const double length[PENTAPOD_LEGS], pentapod_l
 #endif
 
 /* The pose of legs in the component, without a guess. 0, or -1 where there is none, or none that is certain.
- * As built: Newton's steps from the closed form, each at most half the one before, and an end on the component's side of
- * w and S; where that fails, the same on a way of eight stages from the closed form's own lengths to the real ones. */
+ * As built: Newton's steps from the closed form, each but the first at most half the one before, and an end on the
+ * component's side of w and S; where that fails, the same on a way of eight stages from the closed form's own lengths to the real ones. */
 static inline int pentapod_line_of_legs(const double legs[PENTAPOD_LEGS], pentapod_line *line)
 {
 #if PENTAPOD_AS_BUILT
@@ -639,7 +641,7 @@ static inline int pentapod_too_near(
     return 0;
 }
 
-/* moving: a program; pace: its speed as a share of the one that it asks for. */
+/* moving: a program; pace: its speed as a share of the one that it asks for, below 0 where that is not known. */
 static inline void pentapod_guard(
     const double legs[PENTAPOD_LEGS], double period, int moving, double pace, const pentapod_settings *settings,
     pentapod_memory *memory, pentapod_report *report)
@@ -672,7 +674,9 @@ static inline void pentapod_guard(
         /* Legs are as much slower as the path is: so it is known what they would do at the speed that is asked for. */
         if (!moving)
             memory->whole = 0.0;
-        else if (pace > 0.05)
+        else if (pace < 0.0)
+            memory->whole = share;
+        else if (pace > pentapod_least(0.05, 0.5 / pentapod_most(memory->whole, 1.0)))
             memory->whole = share / pace;
         report->feed = memory->whole > 1.0 ? 1.0 / memory->whole : 1.0;
         share = moving ? settings->path_share : settings->jog_share;

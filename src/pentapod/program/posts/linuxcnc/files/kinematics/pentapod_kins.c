@@ -94,7 +94,7 @@ static void guard(void *argument, long period)
     pentapod_settings settings;
     pentapod_report report;
     double command[PENTAPOD_LEGS], feedback[PENTAPOD_LEGS], real[5], error = 0.0;
-    double requested = GET_REAL(pins->requested_vel), pace = 0.0;
+    double requested = GET_REAL(pins->requested_vel), pace = -1.0;
     pentapod_line told, measured;
     int k, known = memory.known;
     (void)argument;
