@@ -3,10 +3,11 @@
 import threading
 import time
 
+import numpy as np
 import pytest
 
 from pentapod.numerics.kernels import kernels_pay, kernels_used
-from pentapod.numerics.threads import CORES, cores, in_threads
+from pentapod.numerics.threads import CORES, ROWS, cores, for_rows, in_threads
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5, None])
@@ -61,3 +62,22 @@ def test_the_environment_says_how_many_cores_a_process_uses(monkeypatch):
     given = cores()
     monkeypatch.delenv(CORES)
     assert given == cores() >= 1
+
+
+@pytest.mark.parametrize("count", [0, 1, ROWS, 2 * ROWS + 7])
+def test_rows_are_filled_in_the_same_blocks_on_any_number_of_cores(monkeypatch, count):
+    """Each row adds the one before it in its block, so that other blocks would give other sums."""
+    given, found = np.random.default_rng(1).normal(size=(count, 2)), []
+
+    def sums(rows, factor, filled, lengths):
+        filled[:] = factor * np.cumsum(rows, axis=0)
+        lengths[:] = len(rows)
+
+    for number in ("1", "2", "5"):
+        monkeypatch.setenv(CORES, number)
+        filled, lengths = np.full((count, 2), np.nan), np.zeros(count, dtype=np.intp)
+        for_rows(sums, (given,), (3.0,), (filled, lengths))
+        found.append(filled)
+        assert (lengths == np.minimum(ROWS, count - ROWS * (np.arange(count) // ROWS))).all()
+    blocks = [3.0 * np.cumsum(given[k : k + ROWS], axis=0) for k in range(0, count, ROWS)]
+    assert all(np.array_equal(each, np.concatenate([*blocks, np.empty((0, 2))])) for each in found)

@@ -98,7 +98,8 @@ def test_the_page_colours_the_path_by_it_and_so_does_a_run_read_back(planned, tm
     scale = {scale["name"]: scale for scale in page_data(page)["motion"]["scales"]}["material left"]
     assert scale["worst"] == pytest.approx(1e3 * left.allowed)
     assert shown.max() == pytest.approx(1e3 * left.heights.max(), abs=1e-3)
-    assert np.quantile(shown, 0.7) > 0.1, "many keys are beside a ridge"
+    # Even passes leave even ridges: few keys miss them by the chance of where the points are.
+    assert np.quantile(shown, 0.2) > 0.7 * np.quantile(shown, 0.9) > 0.2
     opened = open_run(folder / "out")
     back = stored_outcome(opened, placed_path(opened)).verdict.left
     assert np.abs(back.heights - left.heights).max() < 1e-12

@@ -61,10 +61,12 @@ ROWS_AT_ONCE = 1 << 15
 
 
 def compensation_sentence(program: Program, machine: Machine) -> str:
-    """Return what drives compensate for, and by how much their lengths differ from the program's; "" for nothing."""
+    """Return what drives compensate for, and by how much their lengths differ from the program's.
+
+    Where they compensate for nothing: why, on a calibrated machine whose legs are known to yield; "" on others.
+    """
     if not program.provenance.compensation:
-        asks = machine.calibration is not None and machine.yielding_known
-        return NOT_COMPENSATED if asks else ""
+        return NOT_COMPENSATED if machine.calibration is not None and machine.yielding_known else ""
     most = 1e6 * float(np.abs(springs(program, program.machine(machine), program.legs)).max())
     process = ""
     if (force := program.process_force) is not None:

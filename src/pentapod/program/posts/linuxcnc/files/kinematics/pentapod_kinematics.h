@@ -423,7 +423,8 @@ static inline int pentapod_newton(const double length[PENTAPOD_LEGS], pentapod_l
 
 /* The pose of legs in the component, without a guess. 0, or -1 where there is none, or none that is certain.
  * As built: Newton's steps from the closed form, each but the first at most half the one before, and an end on the
- * component's side of w and S; where that fails, the same on a way of eight stages from the closed form's own lengths to the real ones. */
+ * component's side of w and S; where that fails, the same on a way of eight stages from the closed form's own lengths to
+ * the real ones. */
 static inline int pentapod_line_of_legs(const double legs[PENTAPOD_LEGS], pentapod_line *line)
 {
 #if PENTAPOD_AS_BUILT
