@@ -126,7 +126,7 @@ def _contour(tree: FacetTree, nodes: Nodes, blocks: _Blocks, wide: Bools, distan
     points, normals = np.empty_like(starts), np.empty_like(starts)
     metres = (cells.grid.step * lengths).astype(np.float64)
     given = (distance, tree.corners, tree.starts, tree.extents)
-    for_rows(cross_level, (starts, axes, metres), given, (points, normals))
+    for_rows(cross_level, (starts, axes, metres, outside[rows]), given, (points, normals))
     crossings = Crossings(nodes.keys[rows], axes, lengths, outside[rows], points, normals)
     vertices, triangles, _ = dual_contour(cells, nodes.keys, outside, crossings)
     return onto_level(tree, vertices, distance, _ROUNDS, _ON_LEVEL)[0], triangles

@@ -38,10 +38,12 @@ def _box_distance(box: Floats, x: float, y: float, z: float, g: Floats) -> float
 
 
 @kernel
-def facet_distance(p: Floats, x: float, y: float, z: float, g: Floats) -> float:
-    """Return the distance of a point from a facet (3, 3); write the vector from the facet to the point into g (3,).
+def facet_square(p: Floats, x: float, y: float, z: float, g: Floats) -> float:
+    """Return the squared distance of a point from a facet (3, 3); write the vector from it to the point into g (3,).
 
-    Ericson, Real-Time Collision Detection, section 5.1.5.
+    Ericson, Real-Time Collision Detection, section 5.1.5; what he takes from the second and third corner is had from
+    the first one and the products of the sides. Whatever rounding does to it, it is the distance from a place of the
+    facet.
     """
     abx, aby, abz = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
     acx, acy, acz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
@@ -49,10 +51,9 @@ def facet_distance(p: Floats, x: float, y: float, z: float, g: Floats) -> float:
     d1, d2 = abx * apx + aby * apy + abz * apz, acx * apx + acy * apy + acz * apz
     v, w = 0.0, 0.0
     if not (d1 <= 0.0 and d2 <= 0.0):
-        bpx, bpy, bpz = x - p[1, 0], y - p[1, 1], z - p[1, 2]
-        d3, d4 = abx * bpx + aby * bpy + abz * bpz, acx * bpx + acy * bpy + acz * bpz
-        cpx, cpy, cpz = x - p[2, 0], y - p[2, 1], z - p[2, 2]
-        d5, d6 = abx * cpx + aby * cpy + abz * cpz, acx * cpx + acy * cpy + acz * cpz
+        cosine = abx * acx + aby * acy + abz * acz
+        d3, d4 = d1 - (abx * abx + aby * aby + abz * abz), d2 - cosine
+        d5, d6 = d1 - cosine, d2 - (acx * acx + acy * acy + acz * acz)
         va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
         if d3 >= 0.0 and d4 <= d3:
             v = 1.0
@@ -68,10 +69,15 @@ def facet_distance(p: Floats, x: float, y: float, z: float, g: Floats) -> float:
         else:
             total = va + vb + vc
             v, w = vb / total, vc / total
-    g[0] = apx - v * abx - w * acx
-    g[1] = apy - v * aby - w * acy
-    g[2] = apz - v * abz - w * acz
-    return math.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+    gx, gy, gz = apx - v * abx - w * acx, apy - v * aby - w * acy, apz - v * abz - w * acz
+    g[0], g[1], g[2] = gx, gy, gz
+    return gx * gx + gy * gy + gz * gz
+
+
+@kernel
+def facet_distance(p: Floats, x: float, y: float, z: float, g: Floats) -> float:
+    """Return the distance of a point from a facet (3, 3); write the vector from the facet to the point into g (3,)."""
+    return math.sqrt(facet_square(p, x, y, z, g))
 
 
 @kernel

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
-from pentapod.mesh.query.ball_kernels import EXACT_M, ROUNDS, facet_distance, lower_bound, nearest_time, slope
+from pentapod.mesh.query.ball_kernels import EXACT_M, ROUNDS, facet_distance, facet_square, lower_bound, nearest_time, slope
 from pentapod.mesh.query.box_kernels import box_radius, open_node
 from pentapod.numerics.kernels import kernel
 
@@ -135,12 +135,12 @@ def nearest_all(
 
 
 @kernel
-def _box_distance(extent: Floats, x: float, y: float, z: float) -> float:
-    """Return the distance of a point from a box (2, 3)."""
+def _box_square(extent: Floats, x: float, y: float, z: float) -> float:
+    """Return the squared distance of a point from a box (2, 3)."""
     dx = max(extent[0, 0] - x, 0.0, x - extent[1, 0])
     dy = max(extent[0, 1] - y, 0.0, y - extent[1, 1])
     dz = max(extent[0, 2] - z, 0.0, z - extent[1, 2])
-    return math.sqrt(dx * dx + dy * dy + dz * dz)
+    return dx * dx + dy * dy + dz * dz
 
 
 @kernel
@@ -153,31 +153,39 @@ def closest(
     guess: a facet that may be near, −1 for none; the search is quicker. nodes, bounds (STACK,): room for the search.
     away (6,): the vector from the mesh to the point goes into the first three; the others are room.
     """
-    best, facet, leaves = within, -1, len(starts) - 1
-    nodes[0], bounds[0], count = 0, _box_distance(extents[0], x, y, z), 1
+    best, facet, leaves = max(within, 0.0) ** 2, -1, len(starts) - 1  # distances are compared by their squares
+    nodes[0], bounds[0], count = 0, _box_square(extents[0], x, y, z), 1
     g = away[3:]
     if guess >= 0:
-        distance = facet_distance(corners[guess], x, y, z, g)
-        if distance < best:
-            best, facet = distance, guess
+        square = facet_square(corners[guess], x, y, z, g)
+        if square < best:
+            best, facet = square, guess
             away[0], away[1], away[2] = g[0], g[1], g[2]
     while count > 0:
         count -= 1
-        node = nodes[count]
         if bounds[count] >= best:
             continue
+        node = nodes[count]
+        while node < leaves - 1:  # down to a leaf, the nearer child first; the other one waits
+            first, second = 2 * node + 1, 2 * node + 2
+            near, far = _box_square(extents[first], x, y, z), _box_square(extents[second], x, y, z)
+            if far < near:
+                first, second, near, far = second, first, far, near
+            if far < best:
+                nodes[count], bounds[count] = second, far
+                count += 1
+            if near >= best:
+                break
+            node = first
+        if node < leaves - 1:
+            continue
         leaf = node - (leaves - 1)
-        if leaf < 0:
-            near = _box_distance(extents[2 * node + 1], x, y, z)
-            far = _box_distance(extents[2 * node + 2], x, y, z)
-            count = open_node(node, near, far, best, count, nodes, bounds)
-        else:
-            for f in range(starts[leaf], starts[leaf + 1]):
-                distance = facet_distance(corners[f], x, y, z, g)
-                if distance < best:
-                    best, facet = distance, f
-                    away[0], away[1], away[2] = g[0], g[1], g[2]
-    return best, facet
+        for f in range(starts[leaf], starts[leaf + 1]):
+            square = facet_square(corners[f], x, y, z, g)
+            if square < best:
+                best, facet = square, f
+                away[0], away[1], away[2] = g[0], g[1], g[2]
+    return (within if facet < 0 else math.sqrt(best)), facet
 
 
 @kernel
@@ -205,9 +213,10 @@ def all_within(points: Floats, distance: float, corners: Floats, starts: Ints, e
     The facet near to one is tried first for the next. A search ends with the first such facet.
     """
     nodes, leaves, last, g = np.empty(STACK, dtype=np.intp), len(starts) - 1, 0, np.empty(3)
+    square = max(distance, 0.0) ** 2
     for m in range(len(points)):
         x, y, z = points[m, 0], points[m, 1], points[m, 2]
-        found = facet_distance(corners[last], x, y, z, g) < distance
+        found = facet_square(corners[last], x, y, z, g) < square
         nodes[0], count = 0, 1
         while count > 0 and not found:
             count -= 1
@@ -215,18 +224,18 @@ def all_within(points: Floats, distance: float, corners: Floats, starts: Ints, e
             leaf = node - (leaves - 1)
             if leaf >= 0:
                 for f in range(starts[leaf], starts[leaf + 1]):
-                    if facet_distance(corners[f], x, y, z, g) < distance:
+                    if facet_square(corners[f], x, y, z, g) < square:
                         found, last = True, f
                         break
                 continue
             near, far = 2 * node + 1, 2 * node + 2
-            to_near, to_far = _box_distance(extents[near], x, y, z), _box_distance(extents[far], x, y, z)
+            to_near, to_far = _box_square(extents[near], x, y, z), _box_square(extents[far], x, y, z)
             if to_near > to_far:
                 near, far, to_near, to_far = far, near, to_far, to_near
-            if to_far < distance:
+            if to_far < square:
                 nodes[count] = far
                 count += 1
-            if to_near < distance:
+            if to_near < square:
                 nodes[count] = near
                 count += 1
         within[m] = found
