@@ -7,6 +7,7 @@ import time
 import numpy as np
 import pytest
 
+from pentapod.mesh.topology import Topology
 from pentapod.report.drawings.outline import OPTIONS, Outline, outline_of
 from pentapod.report.drawings.raster import Grid, borders, simplified
 
@@ -40,6 +41,11 @@ def joined(*solids):
     )
 
 
+def drawn(vertices, faces):
+    """The outline of facets of vertices."""
+    return outline_of(vertices, Topology(faces, len(vertices)))
+
+
 def lines_on(outline: Outline, axis: int, value: float, within: float) -> float:
     """The length of the lines inside that run along an axis at a value of the other."""
     total = 0.0
@@ -51,14 +57,14 @@ def lines_on(outline: Outline, axis: int, value: float, within: float) -> float:
 
 def test_outline_of_a_tube_has_a_hole():
     vertices, faces = revolved([(10, 0), (20, 0), (20, 5), (10, 5)])
-    outline = outline_of(vertices, faces)
+    outline = drawn(vertices, faces)
     assert len(outline.areas) == 2
     polygon = 48 * np.sin(2 * np.pi / 96)  # area of 96 corners on a circle of radius 1
     assert outline.area == pytest.approx(polygon * (20**2 - 10**2), rel=2e-3)
     inner = min(outline.areas, key=lambda line: np.abs(line).max())
     assert np.linalg.norm(inner, axis=1) == pytest.approx(10.0, abs=0.08)
     # From the side the hole is behind a wall.
-    side = outline_of(vertices @ FRONT.T, faces)
+    side = drawn(vertices @ FRONT.T, faces)
     assert len(side.areas) == 1
     assert side.area == pytest.approx(40 * 5, rel=1e-2)
 
@@ -66,7 +72,7 @@ def test_outline_of_a_tube_has_a_hole():
 def test_outline_is_the_union_and_no_hull():
     """Two boxes in an L, which overlap: the area of the L, exactly."""
     vertices, faces = joined(box((0, 0, 0), (60, 20, 10)), box((0, 0, 0), (20, 50, 30)))
-    outline = outline_of(vertices, faces)
+    outline = drawn(vertices, faces)
     assert outline.area == pytest.approx(60 * 20 + 50 * 20 - 20 * 20, rel=1e-6)
     (line,) = outline.areas
     assert len(line) == 7, "six corners, and the first again"
@@ -77,9 +83,9 @@ def test_outline_is_the_union_and_no_hull():
 def test_outline_hides_lines_behind_the_part():
     """A step on top is drawn from above; a step below is not."""
     step = joined(box((0, 0, 0), (60, 40, 10)), box((20, 5, 10), (50, 35, 20)))
-    assert lines_on(outline_of(*step), 0, 5.0, 0.2) == pytest.approx(30.0, abs=1.0)
+    assert lines_on(drawn(*step), 0, 5.0, 0.2) == pytest.approx(30.0, abs=1.0)
     turned = step[0] * (1.0, -1.0, -1.0), step[1]
-    assert lines_on(outline_of(*turned), 0, -5.0, 0.2) == 0.0
+    assert lines_on(drawn(*turned), 0, -5.0, 0.2) == 0.0
 
 
 @pytest.mark.parametrize("turn", [0.0, 17.0, 45.0])
@@ -87,7 +93,7 @@ def test_outline_keeps_straight_edges_straight(turn):
     angle = np.radians(turn)
     spin = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     vertices, faces = box((0, 0, 0), (70, 30, 10))
-    outline = outline_of(vertices @ spin.T, faces)
+    outline = drawn(vertices @ spin.T, faces)
     (line,) = outline.areas
     assert outline.area == pytest.approx(70 * 30, rel=4e-3)
     cell = 76.0 / OPTIONS.cells
@@ -100,8 +106,8 @@ def test_outline_keeps_straight_edges_straight(turn):
 def test_outline_of_an_open_sheet_and_of_nothing_seen():
     """An open sheet has its border; seen along itself it covers nothing, but is drawn as a line."""
     vertices, faces = np.array([[0, 0, 0], [40, 0, 0], [40, 20, 0], [0, 20, 0.0]]), np.array([[0, 1, 2], [0, 2, 3]])
-    assert outline_of(vertices, faces).area == pytest.approx(800, rel=1e-6)
-    edge_on = outline_of(vertices @ FRONT.T, faces)
+    assert drawn(vertices, faces).area == pytest.approx(800, rel=1e-6)
+    edge_on = drawn(vertices @ FRONT.T, faces)
     assert edge_on.areas == ()
     assert sum(float(np.ptp(line[:, 0])) for line in edge_on.lines) >= 40.0 - 0.1
 
@@ -115,12 +121,12 @@ def test_outline_of_three_hundred_thousand_facets_is_quick():
     faces = np.concatenate([np.stack(f, axis=-1).reshape(-1, 3) for f in ((a, b, c), (a, c, d))])
     assert len(faces) > 300_000
     start = time.process_time()
-    outline = outline_of(vertices, faces)
+    outline = drawn(vertices, faces)
     assert time.process_time() - start < 2.0
     assert outline.area == pytest.approx(200 * 200, rel=1e-6)
     noisy = vertices + np.random.default_rng(1).normal(0.0, 0.5, vertices.shape) * (0.0, 0.0, 1.0)
     start = time.process_time()
-    assert len(outline_of(noisy, faces).lines) <= OPTIONS.most_lines
+    assert len(drawn(noisy, faces).lines) <= OPTIONS.most_lines
     assert time.process_time() - start < 2.0
 
 
@@ -136,7 +142,7 @@ def test_borders_of_cells_that_touch_in_a_corner_stay_apart():
 
 def test_nearest_facet_of_a_cell_is_the_one_towards_the_viewer():
     vertices, faces = joined(box((0, 0, 0), (10, 10, 2)), box((5, 0, 2), (10, 10, 7)))
-    grid = Grid.around(vertices[:, :2], 100)
+    grid = Grid.around(vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0), 100)
     heights = grid.nearest(grid.cuts(vertices[faces]))
     assert heights[50, 20] == pytest.approx(2.0)
     assert heights[50, 80] == pytest.approx(7.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -30,7 +31,15 @@ class RegionShare(Value):
 
     @classmethod
     def of(cls, mesh: Mesh, region: Region) -> RegionShare:
-        """Return the shares of a region of a mesh."""
+        """Return the shares of a region of a mesh, reckoned once for each."""
+        key = np.concatenate([region.direction, region.bounds.ravel(), [region.within]]).tobytes()
+        known = _KNOWN.setdefault(mesh, {})
+        if key not in known:
+            known[key] = cls._of(mesh, region)
+        return known[key]
+
+    @classmethod
+    def _of(cls, mesh: Mesh, region: Region) -> RegionShare:
         area = float(mesh.facet_areas.sum())
         cosine = mesh.facet_normals @ region.direction
         facing = float(mesh.facet_areas[cosine >= np.cos(0.5 * np.pi + WALL_SLACK)].sum())
@@ -64,3 +73,6 @@ def why_empty(mesh: Mesh, region: Region) -> str:
         return f"the box holds nothing of the part, which spans {extent} mm"
     share = f"{100.0 * (1.0 - found.facing):.0f} % of the surface" if region.box is None else "the surface in the box"
     return f"{share} faces away from the direction"
+
+
+_KNOWN: WeakKeyDictionary[Mesh, dict[bytes, RegionShare]] = WeakKeyDictionary()

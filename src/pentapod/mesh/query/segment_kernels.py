@@ -12,7 +12,15 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
-from pentapod.mesh.query.ball_kernels import EXACT_M, ROUNDS, facet_distance, facet_square, lower_bound, nearest_time, slope
+from pentapod.mesh.query.ball_kernels import (
+    EXACT_M,
+    ROUNDS,
+    facet_distance,
+    facet_square,
+    lower_bound,
+    nearest_time,
+    slope,
+)
 from pentapod.mesh.query.box_kernels import box_radius, open_node
 from pentapod.numerics.kernels import kernel
 

@@ -62,15 +62,19 @@ class Outline:
         return sum(_area(line) for line in self.areas)
 
 
-def outline_of(vertices: Floats, faces: Ints, options: OutlineOptions = OPTIONS) -> Outline:
-    """Return the outline of facets (F, 3) of vertices (V, 3): to the right, upwards, and towards the viewer."""
-    grid = Grid.around(vertices[faces.ravel(), :2], options.cells)
+def outline_of(vertices: Floats, topology: Topology, options: OutlineOptions = OPTIONS) -> Outline:
+    """Return the outline of a mesh's facets with vertices (V, 3): to the right, upwards, and towards the viewer."""
+    faces = topology.faces
+    used = np.zeros(len(vertices), dtype=np.bool_)
+    used[faces.ravel()] = True
+    flat = vertices[used, :2].T
+    low, high = flat.min(axis=1), flat.max(axis=1)
+    grid = Grid.around(low, high, options.cells)
     cuts = grid.cuts(vertices[faces])
     covered = grid.covered(cuts)
     areas = [simplified(line, options.close) for line in borders(covered)]
     areas = [grid.points(line) for line in areas if abs(_area(line)) > options.smallest]
-    topology = Topology(faces, len(vertices))
-    turns, creases = _edges(vertices, faces, topology, options)
+    turns, creases = _edges(vertices, topology, options)
     seen = _Seen(grid, covered, grid.nearest(cuts))
     edges = topology.edges
     for drawn in (turns | creases, turns):
@@ -79,10 +83,7 @@ def outline_of(vertices: Floats, faces: Ints, options: OutlineOptions = OPTIONS)
             break
     else:
         lines = []
-    flat = vertices[faces.ravel(), :2]
-    return Outline(
-        tuple(areas), tuple(grid.points(line) for line in lines), flat.min(axis=0), flat.max(axis=0)
-    )  # fmt: skip
+    return Outline(tuple(areas), tuple(grid.points(line) for line in lines), low, high)
 
 
 def _area(line: Floats) -> float:
@@ -91,9 +92,9 @@ def _area(line: Floats) -> float:
     return 0.5 * float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum())
 
 
-def _edges(vertices: Floats, faces: Ints, topology: Topology, options: OutlineOptions) -> tuple[Bools, Bools]:
+def _edges(vertices: Floats, topology: Topology, options: OutlineOptions) -> tuple[Bools, Bools]:
     """Return which edges (E,) are borders or where the surface turns away, and which are creases."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    a, b, c = (vertices[topology.faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     first, second = (side // 3 for side in topology.side_pairs)
@@ -142,7 +143,7 @@ class _Seen:
 
 
 def _joined(parts: Floats, options: OutlineOptions) -> list[Floats] | None:
-    """Return lines (K, 2) of parts (P, 2, 2), joined where two of them meet, and simplified; None: too many parts."""
+    """Return lines (K, 2) of parts (P, 2, 2), joined where two of them meet, and simplified; None: too many."""
     if not len(parts):
         return []
     keys = np.round(2.0 * parts.reshape(-1, 2)).astype(np.intp)
@@ -152,7 +153,11 @@ def _joined(parts: Floats, options: OutlineOptions) -> list[Floats] | None:
     ends = ends[np.unique(ends[:, 0] * len(places) + ends[:, 1], return_index=True)[1]]
     if len(ends) > options.most_links:
         return None
-    lines = [simplified(places[walk], options.close) for walk in _walks(ends, len(places))]
+    walks = _walks(ends, len(places))
+    between = places[[walk[-1] for walk in walks]] - places[[walk[0] for walk in walks]]
+    if np.count_nonzero(np.abs(between).sum(axis=1) >= options.shortest) > options.most_lines:
+        return None  # lines that are kept anyway, and there are more
+    lines = [simplified(places[walk], options.close) for walk in walks]
     return [line for line in lines if np.abs(np.diff(line, axis=0)).sum() >= options.shortest]
 
 

@@ -49,10 +49,8 @@ class Grid:
     shape: tuple[int, int]
 
     @classmethod
-    def around(cls, points: Floats, cells: int) -> Grid:
-        """Return the grid around points (..., 2), with `cells` cells along their longer side."""
-        flat = points.reshape(-1, 2)
-        low, high = flat.min(axis=0), flat.max(axis=0)
+    def around(cls, low: Floats, high: Floats, cells: int) -> Grid:
+        """Return the grid around a box, with lower left and upper right corners (2,); `cells` along its longer side."""
         step = max(float((high - low).max()), 1e-9) / cells
         columns, rows = np.ceil((high - low) / step - 1e-6).astype(np.intp) + 2 * RIM
         return cls(low - RIM * step, step, (int(rows), int(columns)))

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.machine.leg_ends import arms_beside, base_rim, leg_ends, line_top, rails, strut_ends
 from pentapod.machine.machine import Machine
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.topology import Topology
 from pentapod.report.drawings.colours import HELD_COLOUR, LIMIT_COLOUR, QUIET_COLOUR, leg_colour
 from pentapod.report.drawings.outline import Outline, outline_of
 from pentapod.report.drawings.paper import Paper, Rooms
@@ -32,6 +35,12 @@ PART = Rooms(22.0, 14.0, 76.0, 48.0)
 """Room around the part by itself."""
 
 
+MOST_OUTLINES = 8
+"""Outlines of a mesh that are remembered."""
+
+_OUTLINES: WeakKeyDictionary[Mesh, dict[bytes, Outline]] = WeakKeyDictionary()
+
+
 @dataclass(frozen=True, eq=False)
 class View:
     """A direction of view: unit vectors (3,) to the right, upwards on the paper, and towards the viewer.
@@ -50,10 +59,10 @@ class View:
         """Return points (..., 3), metres, on the paper (..., 2), mm."""
         return 1e3 * np.stack([points @ self.right, points @ self.up], axis=-1)
 
-    def seen(self, vertices: Floats, faces: Ints) -> Outline:
-        """Return the outline of facets of vertices (V, 3), metres, on the paper, mm."""
+    def seen(self, vertices: Floats, topology: Topology) -> Outline:
+        """Return the outline of a mesh with vertices (V, 3), metres, on the paper, mm."""
         frame = np.stack([self.right, self.up, np.cross(self.right, self.up)])
-        return outline_of(1e3 * vertices @ frame.T, faces)
+        return outline_of(1e3 * vertices @ frame.T, topology)
 
     def coordinates(self, flat: Floats) -> Floats:
         """Return machine coordinates (..., 2), mm, of places on the paper."""
@@ -99,13 +108,25 @@ def setup_drawings(run: PlannedRun, points: Sequence[TouchOff]) -> str:
     where a drawing is 350 CSS pixels wide. points: to touch off.
     """
     above, front, side = _from_above(run.hangs), _from_front(run.hangs), _along_lean(run)
-    part_above, part_front, part_side = (view.seen(run.vertices, run.mesh.faces) for view in (above, front, side))
+    part_above, part_front, part_side = (_outline(run, view) for view in (above, front, side))
     return (
         _in_machine(run, above, part_above)
         + _in_machine(run, front, part_front)
         + _part(run, above, part_above, points)
         + _part(run, side, part_side, points)
     )
+
+
+def _outline(run: PlannedRun, view: View) -> Outline:
+    """Return the outline of a run's part in a view. The last few are remembered: report and sheet draw the same."""
+    place = run.placement
+    key = np.concatenate([view.right, view.up, place.rotation.ravel(), place.translation]).tobytes()
+    known = _OUTLINES.setdefault(run.mesh, {})
+    if key not in known:
+        if len(known) >= MOST_OUTLINES:
+            known.clear()
+        known[key] = view.seen(run.vertices, run.mesh.topology)
+    return known[key]
 
 
 def machine_drawings(machine: Machine) -> str:
@@ -168,7 +189,7 @@ def _draw_machine(paper: Paper, view: View, bones: _Bones) -> None:
 def _in_machine(run: PlannedRun, view: View, part: Outline) -> str:
     """Return the machine in its first pose with the part, and where the part's datum is."""
     bones = _Bones.of(run.machine, run.first.tip, run.first.axis)
-    held = None if run.held is None else view.seen(run.held.vertices, run.held.faces)
+    held = None if run.held is None else view.seen(run.held.vertices, Topology(run.held.faces, len(run.held.vertices)))
     zero, origin = np.zeros(3), run.placement.translation
     shown = [view.flat(bones.points), view.flat(np.stack([zero, origin])), part.low[None], part.high[None]]
     shown += [] if held is None else [held.low[None], held.high[None]]
