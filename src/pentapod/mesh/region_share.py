@@ -51,7 +51,9 @@ class RegionShare(Value):
             boxed = float(upright.areas.sum())
             at = box.normals.reshape(-1, 3) @ region.direction
             flattest = float(np.arccos(np.clip(at.max(initial=-1.0), -1.0, 1.0)))
-        points = inside.vertices[np.unique(inside.faces)] @ np.stack(tangent_frame(region.direction)).T
+        held = np.zeros(len(inside.vertices), dtype=np.bool_)
+        held[inside.faces.ravel()] = True
+        points = inside.vertices[held] @ np.stack(tangent_frame(region.direction)).T
         x, y = np.ptp(points, axis=0) if len(points) else np.zeros(2)
         shares = (facing / area, boxed / area, float(inside.areas.sum()) / area)
         return cls(*shares, flattest=flattest, widths=(float(x), float(y)))

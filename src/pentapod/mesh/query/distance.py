@@ -99,7 +99,7 @@ class MeshDistance:
     def points(self, points: ArrayLike, within: float = np.inf) -> Gap:
         """Return the distances of points (M, 3), capped at `within`."""
         at = as_floats(points, "points", (None, 3))
-        distance, _, offset, facet = self._nearest(at, np.zeros_like(at), within)
+        distance, offset, facet = self.tree.closest(at, within)
         inside = self._inside(at, offset, facet)
         distance = np.where(inside, -distance, distance)
         return Gap(distance, np.zeros(len(at)), np.where(inside[:, None], -1.0, 1.0) * unit_or_zero(offset))
@@ -107,7 +107,7 @@ class MeshDistance:
     def feet(self, points: ArrayLike) -> Feet:
         """Return the nearest points on the mesh of points (M, 3), and on which side of it they are."""
         at = as_floats(points, "points", (None, 3))
-        _, _, offset, facet = self._nearest(at, np.zeros_like(at), np.inf)
+        _, offset, facet = self.tree.closest(at)
         on = _feature(self.tree.corners[facet], at - offset)
         normals = self._outward[facet, on]
         sides = np.where(np.einsum("ij,ij->i", normals, offset) < 0.0, -1.0, 1.0)
