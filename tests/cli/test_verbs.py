@@ -32,7 +32,7 @@ def test_plan_and_verify(make_job, tmp_path, capsys):
     said = capsys.readouterr()
     assert "part.stl: 288 facets" in said.out
     assert "verdict: passed" in said.out
-    progress = re.compile(r"[a-z ]+( \d+ %|, \d+ s so far)(, about \d+ s left)?(: .*)?")
+    progress = re.compile(r"[a-z ]+( \d+ %)?(, \d+ s so far|, about \d+ s left)?(: .*)?")
     assert all(progress.fullmatch(line) for line in said.err.splitlines()), said.err
     assert {p.name for p in out.iterdir()} == {
         "program.csv",
