@@ -40,6 +40,7 @@ class Subproblem:
     begin: End
     end: End
     length: float
+    least_step: float
     options: JerkOptions
 
     @classmethod
@@ -62,7 +63,7 @@ class Subproblem:
         weight = np.gradient(grid)
         weight *= len(grid) / (weight / np.sqrt(np.minimum(top, ramps))).sum()
         multipliers = _multipliers(grid, rows, before or rough)
-        ends = interval.begin, interval.end, interval.length
+        ends = interval.begin, interval.end, interval.length, interval.least_step
         return cls(grid, knots, basis, first, rows, top, ramps, weight, multipliers, *ends, interval.options)
 
     @cached_property
@@ -201,6 +202,7 @@ class Subproblem:
     def nodes(self, y: Floats) -> SpeedNodes:
         """Return the law at rests, at gridpoints and halfway between, so that cubics follow the spline closely.
 
+        Of nodes that are closer than the least step only the first counts: setpoints do not tell them apart.
         Where the spline dips to 0 or below, which is possible between gridpoints and at seams of windows, the law goes
         on slowly.
         """
@@ -217,6 +219,12 @@ class Subproblem:
             s, x, slope = np.append(0.0, s), np.append(0.0, x), np.append(0.0, slope)
         if self.end.join > 0.0:
             s, x, slope = np.append(s, self.length), np.append(x, 0.0), np.append(slope, 0.0)
+        if self.least_step > 0.0:
+            speed = np.sqrt(x)
+            times = np.cumsum(2.0 * np.diff(s) / (speed[:-1] + speed[1:]))
+            kept = np.concatenate([[True], np.diff(np.floor(times / self.least_step), prepend=0.0) > 0.0])
+            kept[-1] = True
+            s, x, slope = s[kept], x[kept], slope[kept]
         return SpeedNodes(s, x, slope)
 
     def seconds(self, y: Floats) -> float:
