@@ -220,7 +220,7 @@ class Trials:
                     return
 
     def _lengths(self, base: Setting) -> Iterator[Trial]:
-        """Yield the first other tool length that fits, else the best one: with other tool axes, and as it hardly fits."""
+        """Yield the first other tool length that fits, else the best one: with other tool axes, and by itself."""
         settings = self.settings
         if settings.share_in_reach(settings.sketch) < 1.0:
             return
