@@ -39,7 +39,7 @@ def test_the_changes_allow_what_was_estimated(name, tmp_path):
 
 
 def test_a_fixed_part_is_turned_about_the_vertical_first(tmp_path):
-    job, _, mesh, all_ = found(tmp_path, "long part, fixed across")
+    job, _, mesh, all_ = found(tmp_path, "too near")
     assert list(all_)[:2] == ["", "turned about the vertical"]
     place = all_["turned about the vertical"]
     own = job_constraints(job, job_machine(job), mesh).poses[0]

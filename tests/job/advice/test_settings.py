@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,14 +18,17 @@ from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.mesh.query.distance import MeshDistance
 from refused_jobs import REFUSED
 
+JAMMED = replace(REFUSED["thick legs"], edits=(("leg_diameter_mm = 16", "leg_diameter_mm = 60"),))
+"""Legs that touch each other wherever the tool is."""
+
 
 def loaded(folder, name):
-    job = Job.load(REFUSED[name].write(folder))
+    job = Job.load((JAMMED if name == "jammed" else REFUSED[name]).write(folder))
     machine, mesh = job_machine(job), job_mesh(job)
     return job, machine, mesh, job_tool(job, machine)
 
 
-@pytest.mark.parametrize(("name", "never"), [("thick legs", "legs "), ("narrow base cones", "")])
+@pytest.mark.parametrize(("name", "never"), [("jammed", "legs "), ("narrow base cones", "")])
 def test_a_machine_that_reaches_no_place_is_told_from_a_part_that_does_not_fit(name, never, tmp_path):
     job, machine, mesh, tool = loaded(tmp_path, name)
     settings = Settings(job, machine, mesh, Sketch.of_region(job, mesh, tool, 24), None, OPTIONS, lambda _: None)
