@@ -96,6 +96,8 @@ class Trials:
             setting = self.settings.setting(axis, place)
             if not (own or setting.words) or setting.found.margin < self.options.enough:
                 continue
+            if not self.settings.is_usual(setting):
+                continue
             if setting.found.margin < self.options.comfortable:
                 scant.append(setting)
             else:
