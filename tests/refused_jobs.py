@@ -182,7 +182,6 @@ RAPID
 GOTO/-20,10,40,{i},0,{k}
 FINI
 """
-SIDE = {"mode": "fixed", "direction": [1.0, 0.0, 0.0]}
 STRICT = {"tilt_deg": 0.0}
 LARGE = {"toolpath": {"stepover_mm": 120.0, "spacing_mm": 30.0}, "feed": {"cut_mm_min": 20000.0}}
 SCANT = {"toolpath": {"stepover_mm": 300.0, "spacing_mm": 60.0}, "feed": {"cut_mm_min": 20000.0}}
@@ -224,19 +223,15 @@ REFUSED: dict[str, Refused] = {
     "tool of 380 mm on a table": Refused(
         cap(60.0, 35.0), {"tool": {"length_mm": 380.0}, "placement": {"mode": "table", "table_z_mm": 480.0}}
     ),
-    "wide holder in a pocket": Refused(
-        GENERATED["pocket_boss"],
+    "tool of 174 mm, cone of 11": Refused(
+        cap(117.0, 40.0),
         {
-            "tool": {"holder_mm": [[20.0, 20.0, 30.0]], "flute_mm": 6.0},
-            "axis": {"mode": "fixed", "direction": [0, 0, 1]},
+            "tool": {"length_mm": 174.0},
+            "axis": {"tilt_deg": 11.0},
+            "placement": {"mode": "table", "table_z_mm": 450.0},
         },
     ),
     # a wrong fixed axis
-    "axis along x on a plate": Refused(
-        plate(60.0, 60.0, 5.0), {"axis": SIDE, "placement": {"mode": "table", "table_z_mm": 480.0}}
-    ),
-    "axis along x on a dome": Refused(cap(40.0, 40.0), {"axis": SIDE}),
-    "axis along x on a block": Refused(block(50.0, 40.0, 15.0), {"axis": SIDE}),
     "axis downwards": Refused(cap(60.0, 35.0), {"axis": {"mode": "fixed", "direction": [0, 0, -1]}}),
     "axis from a point below": Refused(
         cap(40.0, 70.0), {"axis": {"mode": "from", "point_mm": [0, 0, 5], "tilt_deg": 0}}
@@ -266,25 +261,32 @@ REFUSED: dict[str, Refused] = {
     "narrow platform joints": Refused(
         cap(60.0, 45.0), {}, edits=(("platform_max_deg = 112", "platform_max_deg = 75"),)
     ),
-    "thick legs": Refused(cap(60.0, 45.0), {"axis": STRICT}, edits=(("leg_diameter_mm = 16", "leg_diameter_mm = 60"),)),
+    "thick legs": Refused(cap(60.0, 45.0), {"axis": STRICT}, edits=(("leg_diameter_mm = 16", "leg_diameter_mm = 30"),)),
     # other machines, and one as it was built
     "steep: dome of 85 deg, no cone": Refused(cap(20.0, 85.0), {"machine": {"name": "steep"}, "axis": STRICT}),
     "steep: table too low": Refused(
         cap(50.0, 30.0), {"machine": {"name": "steep"}, "placement": {"mode": "table", "table_z_mm": 900.0}}
     ),
-    "steep: tool along x": Refused(block(40.0, 30.0, 15.0), {"machine": {"name": "steep"}, "axis": SIDE}),
     "general: dome of 60 deg, no cone": Refused(
         cap(20.0, 60.0), {"machine": {"name": "bench-general"}, "axis": STRICT}
     ),
     "general: too near": Refused(cap(50.0, 25.0), {"machine": {"name": "bench-general"}, "placement": at(200.0)}),
+    "general: table too low": Refused(
+        cap(50.0, 25.0),
+        {"machine": {"name": "bench-general"}, "placement": {"mode": "table", "table_z_mm": 900.0}},
+    ),
     "general: plate of 900 x 100": Refused(plate(900.0, 100.0), {"machine": {"name": "bench-general"}, **LARGE}),
     "guide: dome of 65 deg, no cone": Refused(cap(20.0, 65.0), {"machine": {"name": "guide"}, "axis": STRICT}),
     "guide: table too high": Refused(
         cap(50.0, 30.0), {"machine": {"name": "guide"}, "placement": {"mode": "table", "table_z_mm": 150.0}}
     ),
+    "guide: too far": Refused(cap(50.0, 30.0), {"machine": {"name": "guide"}, "placement": at(1200.0)}),
     "calibrated: dome of 65 deg, no cone": Refused(cap(20.0, 65.0), {"axis": STRICT}, calibrated=True),
     "calibrated: table too high": Refused(
         cap(50.0, 30.0), {"placement": {"mode": "table", "table_z_mm": 150.0}}, calibrated=True
+    ),
+    "calibrated: fixed, leaning": Refused(
+        cap(50.0, 30.0), {"placement": at(470.0, (225.0, 0.0, 0.0)), "axis": STRICT}, calibrated=True
     ),
     # turned parts
     "bottom of a block on a table": Refused(
@@ -294,7 +296,17 @@ REFUSED: dict[str, Refused] = {
             "placement": {"mode": "table", "table_z_mm": 500.0},
         },
     ),
-    "long part, fixed across": Refused(plate(480.0, 40.0), {"placement": at(470.0, (180.0, 0.0, 90.0)), **LARGE}),
+    "block upside down on a table": Refused(
+        block(50.0, 40.0, 15.0), {"placement": {"mode": "table", "table_z_mm": 480.0, "up": [0, 0, -1]}}
+    ),
+    "block on its side on a table": Refused(
+        block(50.0, 40.0, 30.0),
+        {
+            "axis": {"mode": "fixed", "direction": [0, 0, 1]},
+            "placement": {"mode": "table", "table_z_mm": 480.0, "up": [1, 0, 0]},
+        },
+    ),
+    "dome fixed on its side": Refused(cap(50.0, 30.0), {"placement": at(470.0, (90.0, 0.0, 0.0))}),
     "fixed, leaning": Refused(cap(50.0, 30.0), {"placement": at(470.0, (225.0, 0.0, 0.0)), "axis": STRICT}),
     # no toolpath
     "hidden under a roof": Refused(under_a_roof, {"part": {"region_box_mm": [[-25, -25, -1], [25, 25, 15]]}}),

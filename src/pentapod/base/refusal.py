@@ -45,18 +45,23 @@ class Change(Value):
     value: Any
 
 
+LITTLE_MARGIN = 0.05
+"""Smallest margin of a plan below which advice says that there is little to spare."""
+
+
 @dataclass(frozen=True)
 class Advice(Value):
     """Changes of a job with which it was planned, and its verdict passed.
 
     words: what they do. kept: share of the area that the job asked for, 0 to 1. whole: False where the part itself
-    becomes another, by its scale or unit.
+    becomes another, by its scale or unit. margin: the smallest of the plan, 0 at a limit; None where it is unknown.
     """
 
     changes: tuple[Change, ...]
     words: str
     kept: float
     whole: bool = True
+    margin: float | None = None
 
     @property
     def tables(self) -> dict[str, dict[str, Any]]:
@@ -83,11 +88,20 @@ class Advice(Value):
         return f"{share} of the area" + ("" if self.whole else ", of another part")
 
     def __str__(self) -> str:
-        return f"{self.words} (keeps {self.keeps})"
+        scant = self.margin is not None and self.margin < LITTLE_MARGIN
+        told = f"; little to spare: its smallest margin is {self.margin:.2g}, 0 is a limit" if scant else ""
+        return f"{self.words} (keeps {self.keeps}{told})"
 
     def to_dict(self) -> dict[str, Any]:
         """Return its entry in verdict.json."""
-        return {"words": self.words, "changes": self.tables, "kept": self.kept, "whole": self.whole, "toml": self.toml}
+        return {
+            "words": self.words,
+            "changes": self.tables,
+            "kept": self.kept,
+            "whole": self.whole,
+            "margin": self.margin,
+            "toml": self.toml,
+        }
 
 
 def _toml(value: Any) -> str:

@@ -9,7 +9,7 @@ from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress, silent
 from pentapod.job.advice.options import OPTIONS, AdviceOptions
 from pentapod.job.build.values import job_machine, job_mesh
-from pentapod.job.pipeline import refused_at
+from pentapod.job.pipeline import tried
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 
@@ -35,4 +35,4 @@ def advise(
     from pentapod.job.advice.search import advised  # noqa: PLC0415  slow, and most jobs need none
 
     used, mesh = job_machine(job, machine), job_mesh(job, progress)
-    return advised(job, used, mesh, None, partial(refused_at, machine=machine), options, progress)
+    return advised(job, used, mesh, None, partial(tried, machine=machine), options, progress)

@@ -55,6 +55,14 @@ class Outcome(Result):
         """Whether there is a program and every claim about it holds."""
         return self.refusal is None and self.verdict.passed
 
+    @property
+    def margin(self) -> float | None:
+        """The smallest margin of its placement, or of its set-ups; None where it has none."""
+        placed, split = self.find(PlacedPath), self.find(SetUps)
+        if split is not None:
+            return min((part.margin for part in split.parts if part.margin is not None), default=None)
+        return None if placed is None else placed.smallest_margin
+
     def unwrap(self) -> Self:
         """Return the outcome itself. Raises RefusalError where the job cannot be done."""
         if self.refusal is not None:
@@ -97,8 +105,7 @@ class SetUp(Value):
     @property
     def margin(self) -> float | None:
         """The smallest margin of its placement; None where it has none."""
-        placed = self.outcome.find(PlacedPath)
-        return None if placed is None else placed.smallest_margin
+        return self.outcome.margin
 
     @property
     def duration(self) -> float | None:

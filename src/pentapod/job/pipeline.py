@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pentapod.base.progress import Progress, silent
-from pentapod.job.advice.options import OPTIONS, AdviceOptions
+from pentapod.job.advice.options import OPTIONS, AdviceOptions, Tried
 from pentapod.job.artefacts import check_folder
 from pentapod.job.build.reach import check_reach
 from pentapod.job.build.upright import may_stand, upright
@@ -77,18 +77,18 @@ def run(
             job, used, mesh, runner, *files, own_machine=own_machine, piece=piece, before=before, **rules
         )
         if piece is None and advice is not None:
-            again = partial(refused_at, machine=machine, limits=limits, claims=claims)
+            again = partial(tried, machine=machine, limits=limits, claims=claims)
             outcome = with_advice(task, mesh, outcome, again, advice, *files)
     return outcome
 
 
-def refused_at(job: Job, progress: Progress = silent, **given: Any) -> str | None:
-    """Return the stage that refuses a job; None where its verdict passes. Nothing is kept. given: as for `run`.
+def tried(job: Job, progress: Progress = silent, **given: Any) -> Tried:
+    """Return how the plan of a job ends. Nothing of it is kept. given: as for `run`.
 
     Raises InputError as `run`, and KeyboardInterrupt where it would go on with the best that a search found till then.
     """
     with tempfile.TemporaryDirectory() as folder:
         outcome = run(job, folder, ending_when_interrupted(progress), advice=None, **given)
     if outcome.passed:
-        return None
-    return "verdict" if outcome.refusal is None else outcome.refusal.stage
+        return Tried(None, outcome.margin)
+    return Tried("verdict" if outcome.refusal is None else outcome.refusal.stage)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pentapod.base.errors import ToolpathError
 from pentapod.base.refusal import Refusal
-from pentapod.job.advice.options import AdviceOptions
+from pentapod.job.advice.options import AdviceOptions, Tried
 from pentapod.job.advice.search import TOUCHES, advised
 from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, write_arrays, write_json
 from pentapod.job.build.limits import pose_limits, timing_limits
@@ -93,14 +93,14 @@ def with_advice(
     task: Task,
     mesh: Mesh,
     outcome: Outcome,
-    again: Callable[..., str | None],
+    again: Callable[..., Tried],
     options: AdviceOptions,
     staging: Path,
     writers: Mapping[str, Writer],
 ) -> Outcome:
     """Search for changes with which a refused job is planned, and return the outcome whose refusal holds them.
 
-    again: plans a job and returns the stage that refuses it, if any, as `pipeline.refused_at`.
+    again: plans a job and returns how that ends, as `pipeline.tried`.
     """
     refusal, runner = outcome.refusal, task.runner
     if refusal is None or refusal.stage in FILES:  # a way is refused by the machine's file, not by the job

@@ -166,7 +166,7 @@ def _refusal(content: Mapping[str, Any] | None) -> Refusal | None:
 
 def _advice(entry: Mapping[str, Any]) -> Advice:
     changes = [Change(table, key, value) for table, keys in entry["changes"].items() for key, value in keys.items()]
-    return Advice(tuple(changes), entry["words"], float(entry["kept"]), bool(entry["whole"]))
+    return Advice(tuple(changes), entry["words"], float(entry["kept"]), bool(entry["whole"]), entry.get("margin"))
 
 
 def _own(kind: type[Any], entry: Mapping[str, Any]) -> dict[str, Any]:

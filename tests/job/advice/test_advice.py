@@ -16,12 +16,13 @@ from pentapod.base.progress import silent
 from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.cli.main import run as run_cli
 from pentapod.job import AdviceOptions, Job, advise, run
+from pentapod.job.advice.options import Tried
 from pentapod.job.advice.search import Advised, advised
 from pentapod.job.advice.settings import Settings
 from pentapod.job.advice_on_errors import can_help
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
-from pentapod.job.pipeline import refused_at
+from pentapod.job.pipeline import tried
 from refused_jobs import REFUSED
 
 TOO_FAR = ("position_mm = [", "position_mm = [1000.0, 0, 700] # [")
@@ -90,13 +91,13 @@ def searched(folder, name, planned, progress=silent, **options) -> Advised:
 def test_the_best_that_passes_comes_first_and_what_fails_is_no_advice(tmp_path):
     planned: list[Job] = []
 
-    def plan(job: Job, _) -> str | None:
+    def plan(job: Job, _) -> Tried:
         planned.append(job)
-        return None if len(planned) > 2 else "placement"
+        return Tried(None, 0.3) if len(planned) > 2 else Tried("placement")
 
     found = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
     assert len(planned) == 4
-    assert len(found.advice) == 2
+    assert [each.margin for each in found.advice] == [0.3, 0.3]
     assert 300.0 < planned[0].placement.table_z_mm < 600.0
     assert planned[0].axis == Job.load(tmp_path / "job.toml").axis
     (table, keys), *_ = found.advice[0].tables.items()
@@ -112,7 +113,7 @@ def test_where_the_tool_body_touches_an_upright_tool_comes_first(make_job):
     touch = [Shortfall("tool body touches the part", ((3, 5),), 0.3, "mm")]
     for under in (None, 0.0):
         job = job.with_(toolpath={"under_mm": under})
-        given = (job, machine, mesh, toolpath, lambda *_: None, AdviceOptions(plans=1), lambda *_: None)
+        given = (job, machine, mesh, toolpath, lambda *_: Tried(None), AdviceOptions(plans=1), lambda *_: None)
         found = advised(*given, short=touch).advice
         upright = [each for each in found if each.toml == "[toolpath]\nunder_mm = 0.0"]
         assert [each.kept for each in upright] == pytest.approx([1.0] if under is None else [])
@@ -129,9 +130,9 @@ def test_a_program_that_fails_is_not_split_into_setups(stage, split, tmp_path, m
             margin=margin, shortfalls=(), samples=kinds[0], candidate=SimpleNamespace(transform=None)
         )
 
-    def plan(job: Job, _) -> str | None:
+    def plan(job: Job, _) -> Tried:
         planned.append(job)
-        return stage
+        return Tried(stage)
 
     monkeypatch.setattr(Settings, "_best", estimated)
     monkeypatch.setattr(Settings, "beyond_a_single_place", lambda _: ())
@@ -146,15 +147,43 @@ def test_a_program_that_fails_is_not_split_into_setups(stage, split, tmp_path, m
     assert any(each.placement.setups > 1 for each in planned) == split
 
 
+def test_a_tool_length_that_hardly_fits_is_planned_after_it_was_tried_with_other_axes(tmp_path, monkeypatch):
+    def estimated(settings, kinds, *_, **__):
+        one = bool((kinds[0].nominal == kinds[0].nominal[0]).all())
+        margin = -0.1 if settings.machine.tool_length < 0.19 else 0.3 if one else 0.03
+        return SimpleNamespace(
+            margin=margin, shortfalls=(), samples=kinds[0], candidate=SimpleNamespace(transform=None)
+        )
+
+    def plan(job: Job, _) -> Tried:
+        planned.append(job)
+        return Tried("placement")
+
+    monkeypatch.setattr(Settings, "_best", estimated)
+    monkeypatch.setattr(Settings, "beyond_a_single_place", lambda _: ())
+    planned: list[Job] = []
+    job = Job.load(REFUSED["dome of 60 deg, no cone"].write(tmp_path)).with_(tool={"length_mm": 174.0})
+    machine, mesh = job_machine(job), job_mesh(job)
+    toolpath = job_toolpath(job, mesh, machine=machine)[0]
+    advised(job, machine, mesh, toolpath, plan, AdviceOptions(plans=2), lambda *_: None)
+    assert [each.tool.length_mm for each in planned] == [machine_length(job)] * 2
+    assert [each.axis.mode for each in planned] == ["fixed", job.axis.mode]
+
+
+def machine_length(job: Job) -> float:
+    """The tool length, mm, of the job's machine file."""
+    return 1e3 * job_machine(job.with_(tool={"length_mm": None})).tool_length
+
+
 def test_the_share_of_a_search_that_is_done_never_falls(tmp_path):
     """The time that is left is told from it; the plans end at the shares that they were given."""
 
-    def plan(_, progress) -> str:
+    def plan(_, progress) -> Tried:
         for stage in ("mesh", "toolpath", "a stage of a plugin", "placement", "timing", "verify"):
             for fraction in (0.0, 0.5, 1.0):
                 progress(stage, fraction)
         ends.append(shares[-1][0])
-        return "verify"
+        return Tried("verify")
 
     ends: list[float] = []
     shares: list[tuple[float, str]] = []
@@ -168,10 +197,11 @@ def test_the_share_of_a_search_that_is_done_never_falls(tmp_path):
 
 
 def test_an_interruption_ends_the_search_and_keeps_what_was_found(tmp_path):
-    def plan(job: Job, _) -> None:
+    def plan(job: Job, _) -> Tried:
         planned.append(job)
         if len(planned) > 1:
             raise KeyboardInterrupt
+        return Tried(None)
 
     planned: list[Job] = []
     found = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
@@ -193,7 +223,7 @@ def test_a_trial_whose_search_for_a_placement_is_interrupted_ends(tmp_path):
             signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
-        refused_at(Job.load(REFUSED["too far"].write(tmp_path)).with_(placement=dict.fromkeys(FIXED)), progress)
+        tried(Job.load(REFUSED["too far"].write(tmp_path)).with_(placement=dict.fromkeys(FIXED)), progress)
     assert any(note.startswith("interrupted") for note in notes)
 
 
@@ -205,8 +235,9 @@ def test_nothing_that_works_is_told(tmp_path):
 
 
 def test_a_part_far_too_large_gets_a_box_within_reach(tmp_path):
-    def plan(job: Job, _) -> None:
+    def plan(job: Job, _) -> Tried:
         planned.append(job)
+        return Tried(None)
 
     planned: list[Job] = []
     found = searched(tmp_path, "plate of 3 x 2 m", plan, points=32, halvings=2)
@@ -230,6 +261,10 @@ def test_advice_in_toml():
         "part": {"flip": True},
     }
     assert str(advice) == "one direction (keeps 83 % of the area)"
+    assert "little to spare: its smallest margin is 0.024" in str(
+        Advice(changes, "one direction", 0.834, margin=0.0241)
+    )
+    assert str(Advice(changes, "one direction", 0.834, margin=0.3)) == str(advice)
     assert str(Advice(changes, "smaller", 1.0, whole=False)) == "smaller (keeps all of the area, of another part)"
 
 

@@ -39,7 +39,7 @@ def test_the_changes_allow_what_was_estimated(name, tmp_path):
 
 
 def test_a_fixed_part_is_turned_about_the_vertical_first(tmp_path):
-    job, _, mesh, all_ = found(tmp_path, "long part, fixed across")
+    job, _, mesh, all_ = found(tmp_path, "too near")
     assert list(all_)[:2] == ["", "turned about the vertical"]
     place = all_["turned about the vertical"]
     own = job_constraints(job, job_machine(job), mesh).poses[0]
@@ -50,4 +50,5 @@ def test_a_fixed_part_is_turned_about_the_vertical_first(tmp_path):
 
 def test_the_side_that_is_machined_is_turned_upwards(tmp_path):
     *_, all_ = found(tmp_path, "bottom of a block on a table")
+    assert "another height of the table" not in all_  # the tool would come through it
     assert all_["lying on another face"].constraints.upright.tolist() == [0.0, 0.0, -1.0]

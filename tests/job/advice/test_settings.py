@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import Job
 from pentapod.job.advice.options import OPTIONS
 from pentapod.job.advice.parts import Regions
-from pentapod.job.advice.settings import Settings
+from pentapod.job.advice.settings import Setting, Settings
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.build.tool import job_tool
 from pentapod.job.build.toolpath import job_toolpath
@@ -16,14 +20,17 @@ from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.mesh.query.distance import MeshDistance
 from refused_jobs import REFUSED
 
+JAMMED = replace(REFUSED["thick legs"], edits=(("leg_diameter_mm = 16", "leg_diameter_mm = 60"),))
+"""Legs that touch each other wherever the tool is."""
+
 
 def loaded(folder, name):
-    job = Job.load(REFUSED[name].write(folder))
+    job = Job.load((JAMMED if name == "jammed" else REFUSED[name]).write(folder))
     machine, mesh = job_machine(job), job_mesh(job)
     return job, machine, mesh, job_tool(job, machine)
 
 
-@pytest.mark.parametrize(("name", "never"), [("thick legs", "legs "), ("narrow base cones", "")])
+@pytest.mark.parametrize(("name", "never"), [("jammed", "legs "), ("narrow base cones", "")])
 def test_a_machine_that_reaches_no_place_is_told_from_a_part_that_does_not_fit(name, never, tmp_path):
     job, machine, mesh, tool = loaded(tmp_path, name)
     settings = Settings(job, machine, mesh, Sketch.of_region(job, mesh, tool, 24), None, OPTIONS, lambda _: None)
@@ -63,3 +70,15 @@ def test_a_smaller_region_is_judged_at_places_that_the_tool_reaches(tmp_path):
         assert ((places > low - 2e-6) & (places < high + 2e-6)).all()
         centres = places + tool.tilt_centre * box.sketch.normals[: len(places)]
         assert (MeshDistance.of(mesh).points(centres).distance.min() > 0.99 * tool.tilt_centre) == clear
+
+
+def test_a_table_beside_the_base_is_no_advice(tmp_path):
+    job, machine, mesh, tool = loaded(tmp_path, "table too low")
+    settings = Settings(job, machine, mesh, Sketch.of_region(job, mesh, tool, 24), None, OPTIONS, lambda _: None)
+    own, table, *_ = settings.places
+    middle = settings.sketch.contacts.mean(axis=0)
+    for height, usual in ((machine.work.centre[2], True), (-0.05, False)):
+        moved = RigidTransform(np.eye(3), np.array([*machine.work.centre[:2], height]) - middle)
+        estimate = SimpleNamespace(candidate=SimpleNamespace(transform=moved))
+        assert settings.is_usual(Setting(settings.axes[0], own, estimate))  # what the job says is what is wanted
+        assert settings.is_usual(Setting(settings.axes[0], table, estimate)) == usual

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from contextlib import contextmanager
 from itertools import groupby
@@ -46,6 +47,18 @@ def test_a_toolpath_file_goes_through_the_whole_of_plan(make_job, tmp_path):
     assert outcome.passed
     assert json.loads((tmp_path / "out" / "verdict.json").read_text())["passed"]
     assert len(read_toolpath(tmp_path / "path.apt")) > 20
+
+
+def test_jobs_for_one_part_share_its_mesh_until_its_file_or_its_keys_change(make_job):
+    job = Job.load(make_job())
+    mesh = job_mesh(job)
+    elsewhere = job.with_(placement={"position_mm": [0.0, 0.0, 500.0]})
+    assert job_mesh(elsewhere) is mesh
+    assert job_mesh(job.with_(part={"scale": 0.5})).bounds == pytest.approx(0.5 * mesh.bounds)
+    os.utime(job.mesh_path, (0, 0))  # as if it had been written again
+    again = job_mesh(job)
+    assert again is not mesh
+    assert again.bounds == pytest.approx(mesh.bounds)
 
 
 def test_the_digest_follows_the_toolpath_file(make_job, tmp_path):

@@ -1,10 +1,18 @@
-"""Options of the search for advice."""
+"""Options of the search for advice, and how a plan in it ended."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from pentapod.base.values import Value
+
+
+class Tried(NamedTuple):
+    """How a plan ended. stage: that refused it, None where its verdict passed. margin: its smallest, if it is known."""
+
+    stage: str | None
+    margin: float | None = None
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,9 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.planning.placement.common_axes import cap_centre
 from pentapod.planning.problem.constraints import FREE, PlacementConstraints
 
+INTO_TABLE = -0.5
+"""Cosine of a region's direction and the part's upward one, below which the tool would come through the table."""
+
 _BOUNDS = tuple(dict.fromkeys(key for keys in PLACEMENT_KEYS.values() for key in keys if key != "table_z_mm"))
 
 
@@ -49,7 +52,8 @@ def places(job: Job, machine: Machine, mesh: Mesh, sketch: Sketch, options: Advi
         table = _Table.of(job, machine, mesh, own)
         if job.placement.mode == "fixed":
             found.append(table.place("turned about the vertical", table.up, moving=False))
-        found.append(table.place("another height of the table", table.up, moving=True))
+        if float(normalised(job.part.si.region_direction) @ table.up) > INTO_TABLE:
+            found.append(table.place("another height of the table", table.up, moving=True))
         for face in _faces(job, sketch):
             if float(angle_between(face, table.up)) > to_si(options.other_face_deg, "deg"):
                 found.append(table.place("lying on another face", face, moving=True))

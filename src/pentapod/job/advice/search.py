@@ -13,7 +13,7 @@ from pentapod.base.progress import Progress
 from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.base.values import Value
 from pentapod.job.advice.failed_claims import FailedClaims
-from pentapod.job.advice.options import AdviceOptions
+from pentapod.job.advice.options import AdviceOptions, Tried
 from pentapod.job.advice.settings import TOUCHES, Settings, Tell, joined, merged
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.advice.starts import starts
@@ -32,8 +32,8 @@ STAGES = {"toolpath": (0.0, 0.3), "placement": (0.3, 0.6), "tool axis": (0.3, 0.
           "timing": (0.65, 0.8), "verify": (0.8, 1.0)}  # fmt: skip
 """Where in a plan its stages begin and end, as shares of its time; for the progress alone."""
 
-Planned = Callable[[Job, Progress], str | None]
-"""Plans a job, all stages, and returns the stage that refused it; None where its verdict passed.
+Planned = Callable[[Job, Progress], Tried]
+"""Plans a job, all stages, and returns how that ended.
 
 Raises KeyboardInterrupt where it is interrupted.
 """
@@ -102,11 +102,11 @@ def advised(
     try:
         for number, trial in enumerate(islice(trials, count)):
             tried[trial.words] = None
-            ended.append(_ended(planned, job, trial, partial(shown.plan, number, trial.words)))
+            ended.append((plan := _ended(planned, job, trial, partial(shown.plan, number, trial.words))).stage)
             shown.number = number + 1
-            if ended[-1] is None:
+            if plan.stage is None:
                 changes = (Change(table, *item) for table, keys in trial.changes.items() for item in keys.items())
-                found.append(Advice(tuple(changes), trial.words, trial.kept, trial.whole))
+                found.append(Advice(tuple(changes), trial.words, trial.kept, trial.whole, plan.margin))
             if len(found) == options.wanted:
                 break
     except KeyboardInterrupt:
@@ -147,12 +147,12 @@ class _Shown:
         self.progress("advice", self.reached, words)
 
 
-def _ended(planned: Planned, job: Job, trial: Trial, progress: Progress) -> str | None:
-    """Return the stage that refuses a job with the changes of a trial; None where it passes."""
+def _ended(planned: Planned, job: Job, trial: Trial, progress: Progress) -> Tried:
+    """Return how the plan of a job with the changes of a trial ends."""
     try:
         return planned(job.with_(**trial.changes), progress)
     except InputError:  # nothing to machine, or values that do not go with each other
-        return "input"
+        return Tried("input")
 
 
 def _trials(

@@ -101,7 +101,7 @@ class Settings:
 
     @cached_property
     def looked_at(self) -> list[Setting]:
-        """The settings that were estimated for the whole task so far."""
+        """The settings that were estimated for the whole task so far, but for places where nobody builds a table."""
         return []
 
     @cached_property
@@ -126,8 +126,19 @@ class Settings:
         """Return the setting of the whole task."""
         self.tell(joined(axis.words, place.words))
         setting = Setting(axis, place, self._best(axis.kinds(self.sketch), place, None, obstacles=True))
-        self.looked_at.append(setting)
+        if self.is_usual(setting):
+            self.looked_at.append(setting)
         return setting
+
+    def is_usual(self, setting: Setting) -> bool:
+        """Return whether a setting's table holds the task within the work volume's width of its middle.
+
+        Elsewhere there may be a place, too, as beside the base: nobody builds a table there.
+        """
+        if not setting.place.words or setting.place.constraints is FREE:
+            return True
+        middle = setting.found.candidate.transform.apply(self.sketch.contacts.mean(axis=0))
+        return bool(np.linalg.norm(middle - self.machine.work.centre) <= self.machine.work.diameter)
 
     def first_that_fits(self, sketch: Sketch) -> Setting | None:
         """Return the first setting in which a part of the task fits comfortably, else the best that fits at all."""
@@ -136,6 +147,8 @@ class Settings:
             for axis in self.of(place):
                 self.tell(joined(axis.words, place.words))
                 found = Setting(axis, place, self._best(axis.kinds(sketch), place, None, obstacles=True))
+                if not self.is_usual(found):
+                    continue
                 if found.found.margin >= self.options.comfortable:
                     return found
                 if best is None or found.found.margin > best.found.margin:

@@ -96,6 +96,8 @@ class Trials:
             setting = self.settings.setting(axis, place)
             if not (own or setting.words) or setting.found.margin < self.options.enough:
                 continue
+            if not self.settings.is_usual(setting):
+                continue
             if setting.found.margin < self.options.comfortable:
                 scant.append(setting)
             else:
@@ -220,24 +222,39 @@ class Trials:
                     return
 
     def _lengths(self, base: Setting) -> Iterator[Trial]:
-        """Yield the first other tool length that fits."""
+        """Yield the first other tool length that fits, else the best one: with other tool axes, and by itself."""
         settings = self.settings
         if settings.share_in_reach(settings.sketch) < 1.0:
             return
         settings.tell("another tool.length_mm")
-        lengths = [from_si(share * settings.machine.tool_length, "mm") for share in self.options.lengths]
-        if settings.job.tool.length_mm is not None:  # first the length that the machine's file has
-            lengths.insert(0, from_si(job_machine(settings.job.with_(tool={"length_mm": None})).tool_length, "mm"))
-        for length in (round(float(each)) for each in lengths):
+        best: tuple[float, float, Settings] = (-np.inf, 0.0, settings)
+        for length in self._other_lengths():
             try:
                 other = replace(settings, machine=settings.machine.with_tool(to_si(length, "mm")))
                 found = other.less(base, settings.sketch)
             except InputError:  # the spindle or the holder would not fit
                 continue
+            if found is not None and found.margin > best[0]:
+                best = found.margin, length, other
             if settings.fits(found):
-                changes = merged(base.changes, {"tool": {"length_mm": float(length)}})
-                yield Trial(joined(f"a tool of {length} mm", base.words), changes, 1.0, self.options.worth_length)
-                return
+                break
+        margin, length, other = best
+        words, keys, worth = f"a tool of {length:g} mm", {"tool": {"length_mm": length}}, self.options.worth_length
+        if base.found.margin < margin < self.options.enough:
+            settings_of = (other.setting(axis, base.place) for axis in other.of(base.place))
+            fits = next((each for each in settings_of if each.found.margin >= self.options.enough), None)
+            if fits is not None:
+                yield Trial(joined(words, fits.words), merged(fits.changes, keys), 1.0, worth)
+        if margin >= self.options.scarcely:
+            yield Trial(joined(words, base.words), merged(base.changes, keys), 1.0, worth)
+
+    def _other_lengths(self) -> list[float]:
+        """Return lengths of the tool to try, mm; first that of the machine's file, where the job has another."""
+        settings = self.settings
+        lengths = [from_si(share * settings.machine.tool_length, "mm") for share in self.options.lengths]
+        if settings.job.tool.length_mm is not None:
+            lengths.insert(0, from_si(job_machine(settings.job.with_(tool={"length_mm": None})).tool_length, "mm"))
+        return [float(round(float(each))) for each in lengths]
 
     def _scales(self, base: Setting) -> Iterator[Trial]:
         """Yield the largest scale that fits, by bisection; it makes another part."""

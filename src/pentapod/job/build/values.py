@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+from contextlib import suppress
 from typing import Any, cast
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -26,6 +28,9 @@ LARGEST_TOLERANCE = 0.1
 
 SLACK = 1e-6
 """Metres by which the stock may be smaller than the part, for rounding."""
+
+_READ: WeakValueDictionary[tuple[object, ...], Mesh] = WeakValueDictionary()
+"""Meshes in use, by file and keys: with the same mesh, other jobs for a part share what was made from it."""
 
 
 def job_machine(job: Job, machine: Machine | None = None) -> Machine:
@@ -90,17 +95,26 @@ def is_compensated(job: Job, machine: Machine) -> bool:
 
 
 def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
-    """Return the job's mesh. Raises MeshError, or JobError where its unit, or lengths of the job, do not suit it."""
-    part = job.part
-    try:
-        mesh = load_mesh(
-            job.mesh_path, part.unit, scale=part.scale, repair=part.repair, flip=part.flip,
-            chordal=job.tolerance.si.chordal, progress=progress,
-        )  # fmt: skip
-    except MeshError as error:
-        if error.key != "unit":
-            raise
-        raise job.error("part", "unit", error.what, expected=error.expected, remedy=error.remedy) from error
+    """Return the job's mesh: the same value as long as it is in use, and its file and its keys are the same.
+
+    Raises MeshError, or JobError where its unit, or lengths of the job, do not suit it.
+    """
+    part, path = job.part, job.mesh_path
+    keys = {"scale": part.scale, "repair": part.repair, "flip": part.flip, "chordal": job.tolerance.si.chordal}
+    mesh, known = None, None
+    with suppress(OSError):  # reading the file tells why
+        state = path.stat()
+        known = (path.resolve(), state.st_mtime_ns, state.st_size, part.unit, *keys.values())
+        mesh = _READ.get(known)
+    if mesh is None:
+        try:
+            mesh = load_mesh(path, part.unit, **keys, progress=progress)
+        except MeshError as error:
+            if error.key != "unit":
+                raise
+            raise job.error("part", "unit", error.what, expected=error.expected, remedy=error.remedy) from error
+        if known is not None:
+            _READ[known] = mesh
     _check_sizes(job, mesh)
     return mesh
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from pentapod.base.arrays import Bools, Floats
+from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.mesh.geodesic.distance import GeodesicField, Sources
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
@@ -92,17 +92,24 @@ def gap_lines(
     part of it. What is not connected to a source gets a line midway between its borders, and others a step from it.
     """
     slowness, parts = slowness_of(patch, steps), list[Passes]()
-    field = GeodesicField.of(patch, sources, slowness)
-    if not np.isfinite(field.values).all():
-        middle = _middle_lines(patch, field.values, slowness)
+    fields = [GeodesicField.of(patch, sources, slowness)]
+    values = fields[0].values
+    if not np.isfinite(values).all():
+        middle = _middle_lines(patch, values, slowness)
         parts.append(middle.lines())
-        field = GeodesicField.of(patch, Sources.joined([sources, lines_as_sources(middle, steps)]), slowness)
-    distance = np.where(np.isfinite(field.values) & (True if where is None else where), field.values, 0.0)
+        # These lines are on other bodies than the sources: nothing changes where distances are known.
+        fields.append(GeodesicField.of(patch, lines_as_sources(middle, steps), slowness))
+        values = np.minimum(values, fields[1].values)
+    distance = np.where(np.isfinite(values) & (True if where is None else where), values, 0.0)
     # Midway between parallel passes the distance is half a step exactly: that is no gap.
     first = 0.25 * (1.0 + options.slack)
+
+    def nearest(facets: Ints, weights: Floats) -> Floats:
+        return np.min([field.at(facets, weights) for field in fields], axis=0)
+
     levels: Floats = np.arange(first, float(distance.max(initial=0.0)), 1.0)
     if len(levels):
-        lines = LevelSet(patch, distance, levels, inside=field.at if where is None else None).lines()
+        lines = LevelSet(patch, distance, levels, inside=nearest if where is None else None).lines()
         negligible = options.negligible * (float(patch.areas.sum()) if area is None else area)
         needed = lines.where(_needed(patch, distance > 0.5 * options.slack, lines, negligible))
         parts.append(_one_side(needed, 0.5 * float(steps.min()), options.reversal))

@@ -28,7 +28,10 @@ from pentapod.toolpath.surfaces.places import DriveOptions
 from pentapod.toolpath.surfaces.rolled_surface import RolledSurface
 
 _KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, float, int, bytes], tuple[FacetTree, Mesh]]] = WeakKeyDictionary()
-"""Drive surfaces of parts that are in use: planning and the verdict need the same."""
+"""Drive surfaces of parts that are in use: planning, the verdict and changes of a job need the same."""
+
+_KEPT = 4
+"""Drive surfaces of a part that are kept, the last ones used: they are large."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +80,9 @@ class DriveSurface(RolledSurface):
             # A line goes on over creases of the drive surface: no edge of it parts passes.
             mesh = Mesh.of(vertices, faces, source=part.diagnosis.source, crease_angle=np.pi)
             known[key] = tree, mesh
-        tree, mesh = known[key]
+        tree, mesh = known[key] = known.pop(key)  # the last one used is the last one
+        while len(known) > _KEPT:
+            del known[next(iter(known))]
         return cls(part, mesh, BallCentres(tree, radius, options), view)
 
     def hides(self, points: Floats, slack: float) -> Bools:
