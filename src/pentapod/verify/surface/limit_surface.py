@@ -22,7 +22,6 @@ from pentapod.verify.surface.reachable import body_reaches, nearest_centres
 from pentapod.verify.verdict.coverage import Coverage
 from pentapod.verify.verdict.cutting import Cutting
 
-
 SAME_AXIS = 1e-12
 """1 less the cosine of two directions that are the same but for rounding."""
 
