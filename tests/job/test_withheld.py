@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
 import concave_parts
 from pentapod.cli.commands.new import dome_stl, job_text
 from pentapod.job import Job, run
-from pentapod.job.build.toolpath import job_toolpath
+from pentapod.job.build.toolpath import Reports, job_toolpath
 from pentapod.job.build.values import job_mesh
 from pentapod.job.withheld import foreseen, withheld
 from pentapod.mesh.io.stl import write_stl
+from pentapod.toolpath.gouge.report import GougeReport
 from pentapod.verify import Claim, Verdict
 from pentapod.verify.replay.claim import Finding
 from pentapod.verify.verdict.verdict import Certificate, Place
+
+TABLES = {
+    "part": {"mesh": "part.stl", "unit": "mm"},
+    "machine": {"name": "desk"},
+    "tool": {"type": "ball", "diameter_mm": 6.0},
+    "toolpath": {"stepover_mm": 4.0},
+    "feed": {"cut_mm_min": 1500.0},
+}
 
 
 def certificate(claim, passed, value=0.5):
@@ -54,14 +64,7 @@ def test_a_program_that_fails_its_verdict_is_not_left_as_program(tmp_path):
 def test_a_toolpath_that_leaves_out_what_the_shank_forbids_is_refused_before_it_is_planned(tmp_path):
     mesh = concave_parts.mesh("pocket_boss")
     (tmp_path / "part.stl").write_bytes(write_stl(1e3 * mesh.vertices[mesh.faces], "pocket"))
-    tables = {
-        "part": {"mesh": "part.stl", "unit": "mm"},
-        "machine": {"name": "desk"},
-        "tool": {"type": "ball", "diameter_mm": 6.0},
-        "toolpath": {"stepover_mm": 4.0},
-        "axis": {"mode": "fixed", "direction": [0.3, 0.0, 1.0]},
-        "feed": {"cut_mm_min": 1500.0},
-    }
+    tables = {**TABLES, "axis": {"mode": "fixed", "direction": [0.3, 0.0, 1.0]}}
     outcome = run(Job.from_dict(tables, tmp_path), tmp_path / "out", advice=None)
     assert outcome.refusal.stage == "toolpath"
     assert "shank or holder would cut into the part" in outcome.refusal.cause
@@ -69,3 +72,12 @@ def test_a_toolpath_that_leaves_out_what_the_shank_forbids_is_refused_before_it_
     assert not (tmp_path / "out" / "program.csv").exists()
     upright = Job.from_dict({**tables, "axis": {"mode": "auto"}}, tmp_path)
     assert foreseen(upright, job_toolpath(upright, job_mesh(upright))[1]) is None
+
+
+def test_long_motions_that_the_shank_forbids_count_by_their_length(tmp_path):
+    """On flat walls cuts are long: a few of thousands of motions may be a fifth of the surface."""
+    (tmp_path / "part.stl").write_bytes(dome_stl(cells=12))
+    job = Job.from_dict({**TABLES, "axis": {"mode": "fixed", "direction": [0.0, 0.0, 1.0]}}, tmp_path)
+    few = GougeReport(motions=3000, gouging=100, depths=(0.0, 5e-4, 0.0), dropped=100, dropped_share=0.19)
+    assert "on 19 % of the cuts" in str(foreseen(job, Reports((few,))))
+    assert foreseen(job, Reports((replace(few, dropped=1000, dropped_share=0.01),))) is None

@@ -56,7 +56,7 @@ def raster(step, low=-0.004, high=0.024, y0=0.0, y1=0.012, z=0.0, lift=0.02):
     return lines
 
 
-def judged(replay, mesh, tool, left, share=0.0, region=None, **more):
+def judged(replay, mesh, tool, left, share=0.0, region=None, tilt=cases.TILT, **more):
     patch = Patch.of(mesh, region or Region())
     cutting = Cutting(MeshDistance.of(mesh), tool.solids, 0.0, Coverage(patch, left, share, UP, **more))
-    return surface_left(cases.same_motion(replay, cutting=cutting))
+    return surface_left(cases.same_motion(replay, cutting=cutting, tilt=tilt))

@@ -18,7 +18,7 @@ STAGE = "verdict"
 
 @dataclass(frozen=True)
 class ForesightOptions:
-    """certain: share of the motions of cuts that are dropped from which the verdict would find the region missed.
+    """certain: share of the length of cuts that is dropped from which the verdict would find the region missed.
 
     As a multiple of the share of the region that may be left.
     """
@@ -32,9 +32,9 @@ def foreseen(job: Job, reports: Reports, options: ForesightOptions = ForesightOp
     The ball's own places count as reached, so the verdict would find them missed; other cutters may not reach them.
     """
     for report in reports.parts:
-        if not isinstance(report, GougeReport) or not report.motions or not rolls(job):
+        if not isinstance(report, GougeReport) or not rolls(job):
             continue
-        share = report.dropped / report.motions
+        share = report.dropped_share
         if share > options.certain * job.tolerance.left_share:
             return Refusal(
                 "toolpath",

@@ -57,7 +57,8 @@ def without_gouges(
             lifted, most = removal.lift(bad)
             report = replace(report, lifted=lifted, most_lifted=most)
         elif remedy is Remedy.DROP:
-            report = replace(report, dropped=removal.drop(bad))
+            dropped = removal.drop(bad)
+            report = replace(report, dropped=dropped, dropped_share=removal.dropped_share())
         bad = removal.gouging()
     result = removal.toolpath() if report.gouging else toolpath
     depths, cutting = removal.all_depths(result)
@@ -194,6 +195,11 @@ class _GougeRemoval:
         high = _waypoints_of(bad) & ~self._kept()
         self.tips = np.where(high[:, None], self.tips + self.options.highest * self.axes, self.tips)
         return int(bad.sum())
+
+    def dropped_share(self) -> float:
+        """Return the share of the length of the path's cuts that is dropped, 0 to 1."""
+        lengths = np.where(self.cut, np.linalg.norm(np.diff(self.path.tilt_centres, axis=0), axis=1), 0.0)
+        return float(lengths[self.dropped].sum() / max(lengths.sum(), np.finfo(np.float64).tiny))
 
     def _kept(self) -> Bools:
         """Return which waypoints (N,) belong to a cut that is not dropped."""

@@ -22,6 +22,9 @@ from pentapod.verify.surface.reachable import body_reaches, nearest_centres
 from pentapod.verify.verdict.coverage import Coverage
 from pentapod.verify.verdict.cutting import Cutting
 
+SAME_AXIS = 1e-12
+"""1 less the cosine of two directions that are the same but for rounding."""
+
 
 @dataclass(frozen=True)
 class LimitOptions:
@@ -112,13 +115,15 @@ class LimitSurface:
     ) -> LimitSurface:
         """Return the limit surface of another cutter: the highest of a few heights that it cannot reach, or none.
 
-        Nothing is known of its normals: those of the part stand for them.
+        It stands as the program has it nearby, or along the normals, unless its axis must keep one direction. Nothing
+        is known of its normals: those of the part stand for them.
         """
         axes = replay.axes[np.asarray(KDTree(replay.tilt_centres).query(points)[1])]
+        ways = (axes,) if _keeps_its_axis(replay) else (axes, normals)
         steps = np.linspace(0.0, coverage.left, options.steps + 1)
         heights = np.full(len(points), np.nan)
         for below, height in zip([0.0, *steps[:-1]], steps, strict=True):
-            for along in (axes, normals):
+            for along in ways:
                 open_ = np.flatnonzero(np.isnan(heights))
                 if len(open_):
                     at, up = points[open_] + height * normals[open_], normals[open_]
@@ -154,6 +159,12 @@ def under_overhangs(
 def is_ball_end(replay: Replay, solid: Solid) -> bool:
     """Return whether a solid is the ball about the tilt centre."""
     return solid.is_ball and solid.low == replay.toolpath.tilt_centre
+
+
+def _keeps_its_axis(replay: Replay) -> bool:
+    """Return whether the tool must keep one direction: the toolpath does, and the axis may not leave it."""
+    own = replay.toolpath.axes
+    return replay.specification.tilt == 0.0 and bool((own @ own[0] > 1.0 - SAME_AXIS).all())
 
 
 def _seen(coverage: Coverage, cutting: Cutting, points: Floats, within: float) -> Bools:
