@@ -98,7 +98,7 @@ def test_explanation_is_json_for_a_report():
 
 def test_summary_of_a_cycle_time_adds_up_the_legs_and_begins_with_the_longest():
     m = machine()
-    story = explain(timed(Path((raster(lines=4, width=0.08, feed=0.3),)), m), m)
+    story = explain(timed(Path((raster(lines=6, width=0.08, feed=0.3),)), m), m)
     title, *lines = story.in_short().splitlines()
     assert title == str(story).splitlines()[0]
     told = {line.strip().split("-limited for ")[0]: float(line.split(" for ")[1].split(" s")[0]) for line in lines}

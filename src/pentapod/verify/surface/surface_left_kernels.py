@@ -9,6 +9,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.numerics.kernels import kernel
 from pentapod.verify.surface.swept_cutter_kernels import (
+    ENTERED_M,
     STACK,
     Room,
     Swept,
@@ -77,7 +78,7 @@ def _deepen(q: Floats, n: Floats, most: float, warm: int, swept: Swept, room: Ro
     x = np.empty(3)
     for i in range(3):
         x[i] = q[i] + deepest[0] * n[i]
-    if nearest_stretch(x, warm, 0.0, swept, room)[0] <= 0.0:
+    if nearest_stretch(x, warm, 0.0, 1e-12, swept, room)[0] <= 0.0:
         return
     left = entry(q, n, most, warm, swept, room)[0]
     if left > deepest[0]:
@@ -122,7 +123,7 @@ def uncovered(
                 _halve(cells, count)
                 count += 1
                 continue
-            gap, warm, share = nearest_stretch(x, warm, -reach, swept, room)
+            gap, warm, share = nearest_stretch(x, warm, -reach, reach + ENTERED_M, swept, room)
             if gap <= -reach or (gap <= 0.0 and _covers(cell, rise, stretches[warm], solid, is_ball, share)):
                 count -= 1
                 _deepen(middle, normals[f], height, warm, swept, room, deepest)

@@ -110,6 +110,20 @@ def to_stretch(x: Floats, stretch: Floats, solid: Floats, is_ball: bool) -> tupl
 
 
 @kernel
+def _may_be_nearer(x: Floats, stretch: Floats, solid: Floats, best: float) -> bool:
+    """Return whether a solid may come nearer to a point on a stretch than `best`: a convex function is above chords.
+
+    From its middle it cannot fall to one end by more than it has risen from there to the other.
+    """
+    first, middle, last = (
+        at_share(x, stretch, solid, 0.0),
+        at_share(x, stretch, solid, 0.5),
+        at_share(x, stretch, solid, 1.0),
+    )
+    return min(first, last, 2.0 * middle - max(first, last)) + stretch[12] < best
+
+
+@kernel
 def _to_box(x: Floats, box: Floats) -> float:
     square = 0.0
     for j in range(3):
@@ -119,19 +133,23 @@ def _to_box(x: Floats, box: Floats) -> float:
 
 
 @kernel
-def nearest_stretch(x: Floats, warm: int, enough: float, swept: Swept, room: Room) -> tuple[float, int, float]:
+def nearest_stretch(
+    x: Floats, warm: int, enough: float, within: float, swept: Swept, room: Room
+) -> tuple[float, int, float]:
     """Return the signed distance of a point from the swept volume, the nearest stretch, and the share of it.
 
-    Ends at the first place that is not farther than `enough`. warm: a stretch to start with, −1 for none.
+    Ends at the first place that is not farther than `enough`. within: only what is nearer is searched; where nothing
+    is, it is the distance. warm: a stretch to start with, −1 for none; returned where nothing is nearer.
     """
     stretches, boxes, starts, solid, wide, is_ball = swept
     nodes, bounds = room
-    best, facet, where = math.inf, -1, 0.0
+    best, facet, where = within, warm, 0.0
     if warm >= 0:
-        best, where = to_stretch(x, stretches[warm], solid, is_ball)
-        facet = warm
-        if best <= enough:
-            return best, facet, where
+        distance, share = to_stretch(x, stretches[warm], solid, is_ball)
+        if distance < best:
+            best, where = distance, share
+            if best <= enough:
+                return best, facet, where
     leaves = len(starts) - 1
     nodes[0], bounds[0] = 0, _to_box(x, boxes[0]) - wide
     count = 1
@@ -146,6 +164,8 @@ def nearest_stretch(x: Floats, warm: int, enough: float, swept: Swept, room: Roo
             count = open_node(node, near, far, best, count, nodes, bounds)
         else:
             for k in range(starts[leaf], starts[leaf + 1]):
+                if k == warm or not (is_ball or _may_be_nearer(x, stretches[k], solid, best)):
+                    continue
                 distance, share = to_stretch(x, stretches[k], solid, is_ball)
                 if distance < best:
                     best, facet, where = distance, k, share
@@ -161,12 +181,12 @@ def entry(q: Floats, n: Floats, most: float, warm: int, swept: Swept, room: Room
     for _ in range(RAY_STEPS):
         for i in range(3):
             x[i] = q[i] + t * n[i]
-        gap, warm, _ = nearest_stretch(x, warm, ENTERED_M, swept, room)
+        gap, warm, _ = nearest_stretch(x, warm, ENTERED_M, most - t, swept, room)
+        if gap >= most - t:
+            return most, warm
         if gap <= ENTERED_M:
             return t, warm
         t += gap
-        if t >= most:
-            return most, warm
     return t, warm
 
 
@@ -184,5 +204,4 @@ def distances(points: Floats, swept: Swept, gaps: Floats) -> None:
     """Lower gaps (N,) to the signed distances of points (N, 3) from the swept volume."""
     room, warm = (np.empty(STACK, dtype=np.intp), np.empty(STACK)), -1
     for k in range(len(points)):
-        gap, warm, _ = nearest_stretch(points[k], warm, -math.inf, swept, room)
-        gaps[k] = min(gaps[k], gap)
+        gaps[k], warm, _ = nearest_stretch(points[k], warm, -math.inf, gaps[k], swept, room)
