@@ -38,7 +38,7 @@ def foreseen(job: Job, reports: Reports, options: ForesightOptions = ForesightOp
         if share > options.certain * job.tolerance.left_share:
             return Refusal(
                 "toolpath",
-                f"with these tool axes shank or holder would cut into the part on {100.0 * share:.2g} % of the cuts, "
+                f"with these tool axes shank or holder would cut into the part on {100.0 * share:.3g} % of the cuts, "
                 f"which are left out; {100.0 * job.tolerance.left_share:.2g} % of the region may be left",
             )
     return None

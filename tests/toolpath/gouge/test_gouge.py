@@ -123,7 +123,8 @@ def test_drop_after_lift_keeps_the_path_continuous():
     assert cut == 30 - report.dropped
     length = sum(np.linalg.norm(np.diff(s.tips, axis=0), axis=1).sum() for s in found.segments if s.kind == "cut")
     whole = np.linalg.norm(np.diff(path.segments[1].tips, axis=0), axis=1).sum()
-    assert report.dropped_share == pytest.approx(1.0 - length / whole)
+    # Beside the wall the ball is as near to it as to the floor.
+    assert report.dropped_share == pytest.approx(1.0 - length / whole, abs=0.05)
     # The wall is higher than the lift: the link over the dropped cut collides too, and that is reported.
     assert report.unclear > 0
     assert "collide with the part" in str(report)

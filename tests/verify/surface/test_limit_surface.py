@@ -173,14 +173,17 @@ def test_what_a_leaning_tool_might_reach_under_a_ledge_is_told_where_the_tool_st
     assert short.value > 5.0
 
 
-@pytest.mark.parametrize(("turned", "tilt", "missed"), [(0.0, 0.0, 0.0), (0.0, 0.2, 100.0), (1e-3, 0.0, 100.0)])
-def test_a_flat_end_that_keeps_one_direction_answers_for_no_wall_under_a_ledge(turned, tilt, missed):
+@pytest.mark.parametrize(
+    ("kept", "turned", "tilt", "missed"),
+    [(True, 0.0, 0.0, 0.0), (True, 0.0, 0.2, 100.0), (True, 1e-3, 0.0, 100.0), (False, 0.0, 0.0, 100.0)],
+)
+def test_a_flat_end_that_must_keep_one_direction_answers_for_no_wall_under_a_ledge(kept, turned, tilt, missed):
     """Between floor and ledge there is room for the tool along the wall's normal; an upright one finds none."""
     wall, tool = Region(box=((-1e-4, 0.0145, 4e-3), (1e-4, 0.0155, 6e-3)), direction=(1.0, 0.0, 0.0)), FlatEnd(R)
     lines = [np.array([[x, -5e-3, 0.0], [x, 0.035, 0.0]]) for x in (0.016, 0.018)]
     axes = [np.array([[np.sin(angle), 0.0, np.cos(angle)]] * 2) for angle in (0.0, turned)]
     replay = along(*lines, tool=tool, axes=axes)
-    found = judged(replay, ledge(12e-3), tool, 0.25e-3, region=wall, tilt=tilt)
+    found = judged(replay, ledge(12e-3), tool, 0.25e-3, region=wall, tilt=tilt, one_direction=kept)
     assert found.value == pytest.approx(missed)
     assert ("100 % more is hidden by overhangs" in found.method) == (missed == 0.0)
 

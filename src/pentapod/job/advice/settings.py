@@ -120,7 +120,7 @@ class Settings:
 
     def of(self, place: Place) -> Iterator[AxisChoice]:
         """Yield the tool axes to try with one placement."""
-        yield from (axis for axis in self.axes if place is self.places[0] or not axis.narrow)
+        yield from (axis for axis in self.axes if not place.words or not axis.narrow)
 
     def setting(self, axis: AxisChoice, place: Place) -> Setting:
         """Return the setting of the whole task."""

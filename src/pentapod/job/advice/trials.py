@@ -242,7 +242,8 @@ class Trials:
         words, keys, worth = f"a tool of {length:g} mm", {"tool": {"length_mm": length}}, self.options.worth_length
         if base.found.margin < margin < self.options.enough:
             settings_of = (other.setting(axis, base.place) for axis in other.of(base.place))
-            fits = next((each for each in settings_of if each.found.margin >= self.options.enough), None)
+            usual = (each for each in settings_of if each.found.margin >= self.options.enough and other.is_usual(each))
+            fits = next(usual, None)
             if fits is not None:
                 yield Trial(joined(words, fits.words), merged(fits.changes, keys), 1.0, worth)
         if margin >= self.options.scarcely:

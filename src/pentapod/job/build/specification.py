@@ -105,7 +105,7 @@ def job_cutting(job: Job, collision_world: CollisionWorld, machine: Machine | No
         if obstacle.name == "part":
             mesh = obstacle.surface.mesh
             solids = job_tool(job, machine).solids
-            coverage = job_coverage(job, mesh, machine)
+            coverage = replace(job_coverage(job, mesh, machine), one_direction=job.axis.mode == "fixed")
             if job.asked is not None:  # an upright tool where the job lets it lean
                 coverage = replace(coverage, leans=LEANS)
             return Cutting(obstacle.surface, solids, depth, coverage)

@@ -104,7 +104,8 @@ def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
     mesh, known = None, None
     with suppress(OSError):  # reading the file tells why
         state = path.stat()
-        known = (path.resolve(), state.st_mtime_ns, state.st_size, part.unit, *keys.values())
+        when = (state.st_mtime_ns, state.st_ctime_ns, state.st_ino, state.st_size)
+        known = (path.resolve(), *when, part.unit, *keys.values())
         mesh = _READ.get(known)
     if mesh is None:
         try:

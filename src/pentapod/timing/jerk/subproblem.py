@@ -202,7 +202,7 @@ class Subproblem:
     def nodes(self, y: Floats) -> SpeedNodes:
         """Return the law at rests, at gridpoints and halfway between, so that cubics follow the spline closely.
 
-        Of nodes that are closer than the least step only the first counts: setpoints do not tell them apart.
+        At most one node in each least step is kept, the fastest one in any case: setpoints do not tell them apart.
         Where the spline dips to 0 or below, which is possible between gridpoints and at seams of windows, the law goes
         on slowly.
         """
@@ -223,7 +223,7 @@ class Subproblem:
             speed = np.sqrt(x)
             times = np.cumsum(2.0 * np.diff(s) / (speed[:-1] + speed[1:]))
             kept = np.concatenate([[True], np.diff(np.floor(times / self.least_step), prepend=0.0) > 0.0])
-            kept[-1] = True
+            kept[[-1, int(x.argmax())]] = True
             s, x, slope = s[kept], x[kept], slope[kept]
         return SpeedNodes(s, x, slope)
 

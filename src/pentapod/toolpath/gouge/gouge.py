@@ -197,8 +197,12 @@ class _GougeRemoval:
         return int(bad.sum())
 
     def dropped_share(self) -> float:
-        """Return the share of the length of the path's cuts that is dropped, 0 to 1."""
-        lengths = np.where(self.cut, np.linalg.norm(np.diff(self.path.tilt_centres, axis=0), axis=1), 0.0)
+        """Return the share of the length of the path's cuts that is dropped, 0 to 1: along the part.
+
+        Around an edge a ball goes far and touches one place.
+        """
+        places = self.path.tilt_centres - self.tree.closest(self.path.tilt_centres)[1]
+        lengths = np.where(self.cut, np.linalg.norm(np.diff(places, axis=0), axis=1), 0.0)
         return float(lengths[self.dropped].sum() / max(lengths.sum(), np.finfo(np.float64).tiny))
 
     def _kept(self) -> Bools:

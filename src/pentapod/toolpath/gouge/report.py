@@ -79,7 +79,8 @@ class GougeReport(Value):
 
     gouging: how many of them gouged at first; depths: of the deepest gouge of cutter, shank and holder, metres, −inf
     for none. tilted, lifted: number of waypoints changed; most_lifted: metres. dropped: number of motions taken out of
-    the cut; dropped_share: of the length of all cuts. left: number of motions that still gouge; left_depth: how deep,
+    the cut; dropped_share: of the length of all cuts,
+    along the part. left: number of motions that still gouge; left_depth: how deep,
     metres; places: first waypoint of each run of them. relinked: number of links replaced. stuck: number of motions of
     cuts that were left out, as the tool cannot leave them. unclear: number of links that gouge and rapids that touch;
     unclear_places: first waypoint of each run of them.
@@ -112,7 +113,7 @@ class GougeReport(Value):
         if self.lifted:
             text += f"\n  note: {self.lifted:,} waypoints lifted, by up to {1e3 * self.most_lifted:.3g} mm"
         if self.dropped:
-            share = f"{100.0 * self.dropped_share:.2g} % of the length of the cuts"
+            share = f"{100.0 * self.dropped_share:.3g} % of the length of the cuts"
             text += f"\n  note: {self.dropped:,} motions dropped, {share}: material is left there"
         if self.left:
             worst = 1e3 * self.left_depth

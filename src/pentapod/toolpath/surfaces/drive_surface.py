@@ -74,15 +74,16 @@ class DriveSurface(RolledSurface):
         asked = b"" if window is None else window.box.tobytes() + window.view.tobytes()
         key = radius, options.step, options.parts, asked
         known = _KNOWN.setdefault(part, {})
-        if key not in known:
+        found = known.pop(key, None)  # put back as the last one: others are forgotten first
+        if found is None:
             tree = FacetTree.of(part)
             vertices, faces = offset_surface(tree, radius, options.step * radius, options.parts, window)
             # A line goes on over creases of the drive surface: no edge of it parts passes.
             mesh = Mesh.of(vertices, faces, source=part.diagnosis.source, crease_angle=np.pi)
-            known[key] = tree, mesh
-        tree, mesh = known[key] = known.pop(key)  # the last one used is the last one
-        while len(known) > _KEPT:
-            del known[next(iter(known))]
+            found = tree, mesh
+        tree, mesh = known[key] = found
+        for other in list(known)[:-_KEPT]:
+            known.pop(other, None)
         return cls(part, mesh, BallCentres(tree, radius, options), view)
 
     def hides(self, points: Floats, slack: float) -> Bools:

@@ -119,7 +119,7 @@ class LimitSurface:
         is known of its normals: those of the part stand for them.
         """
         axes = replay.axes[np.asarray(KDTree(replay.tilt_centres).query(points)[1])]
-        ways = (axes,) if _keeps_its_axis(replay) else (axes, normals)
+        ways = (axes,) if coverage.one_direction and _keeps_its_axis(replay) else (axes, normals)
         steps = np.linspace(0.0, coverage.left, options.steps + 1)
         heights = np.full(len(points), np.nan)
         for below, height in zip([0.0, *steps[:-1]], steps, strict=True):
@@ -162,7 +162,7 @@ def is_ball_end(replay: Replay, solid: Solid) -> bool:
 
 
 def _keeps_its_axis(replay: Replay) -> bool:
-    """Return whether the tool must keep one direction: the toolpath does, and the axis may not leave it."""
+    """Return whether the tool keeps one direction: the toolpath does, and the axis may not leave it."""
     own = replay.toolpath.axes
     return replay.specification.tilt == 0.0 and bool((own @ own[0] > 1.0 - SAME_AXIS).all())
 

@@ -38,8 +38,9 @@ class Coverage(Value):
     tool the largest distance of the surface from the line of its beam or spray. share: of the region's area, 0 to 1, on
     which more may be left. view (3,): towards the tool, any length. whole: makes the toolpath that covers all of the
     region, where a program may be a piece of it. leans: largest angle of the tool from the view, radians, up to which
-    it is told what the program leaves although a tool that leans might reach it; 0 tells nothing. Raises ArrayError
-    unless `left` is positive and `share` from 0 to 1.
+    it is told what the program leaves although a tool that leans might reach it; 0 tells nothing. one_direction:
+    whether the tool must keep the direction of its axis, so that it need not reach what it could only reach lying down.
+    Raises ArrayError unless `left` is positive and `share` from 0 to 1.
 
     >>> coverage = Coverage.of(part, tool, RasterOptions(stepover=15e-3), path_tolerance=20e-6)
     """
@@ -51,6 +52,7 @@ class Coverage(Value):
     whole: Callable[[], Toolpath] | None = None
     why: str = ""
     leans: float = 0.0
+    one_direction: bool = False
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.left) and self.left > 0.0):
