@@ -76,10 +76,16 @@ def measure(job: Path, folder: Path) -> dict[str, Any]:
 
 
 def in_child(job: Path, folder: Path, source: Path) -> dict[str, Any]:
-    """Return `measure` of a new process that uses the version in a folder of sources."""
+    """Return `measure` of a new process that uses the version in a folder of sources.
+
+    Ends the benchmark where that version cannot run the job: one of before may not know today's keys.
+    """
     command = [sys.executable, __file__, "--measure", str(job), str(folder)]
     own = {**os.environ, "PYTHONPATH": str(source)}
-    answer = subprocess.run(command, capture_output=True, text=True, check=True, env=own)
+    answer = subprocess.run(command, capture_output=True, text=True, check=False, env=own)
+    if answer.returncode != 0:
+        said = (answer.stderr.strip() or "nothing").splitlines()[-1]
+        raise SystemExit(f"the version in {source} cannot run {job.name}; it says: {said}")
     return json.loads(answer.stdout.splitlines()[-1])
 
 
