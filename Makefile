@@ -7,7 +7,7 @@ WEB := src/pentapod/report/web
 # Tests are spread over processes; a numerical library that starts threads of its own would only get in the way.
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
-# Hundreds of tests run the command in a process of its own: without compiled files beside the sources each takes longer.
+# Many tests run the command in a process of its own, which takes longer without compiled files beside the sources.
 export PYTHONDONTWRITEBYTECODE :=
 
 # Two processes, each with whole files as far as that goes, so that what a file's tests share is made once.

@@ -34,14 +34,18 @@ def test_a_region_of_90_degrees_holds_upright_walls(by):
 
 
 def test_shares_of_a_box():
-    found = RegionShare.of(box(0.04, 0.03, 0.02), Region(angle=np.radians(80.0)))
+    part = box(0.04, 0.03, 0.02)
+    found = RegionShare.of(part, Region(angle=np.radians(80.0)))
     assert (found.facing, found.boxed, found.inside) == pytest.approx((40 / 52, 40 / 52, 12 / 52))
     assert found.flattest == pytest.approx(0.0)
     assert sorted(found.widths) == pytest.approx([0.03, 0.04])
     half = Region(box=((-1, -1, -1), (0, 1, 1)), angle=np.pi / 2)
-    found = RegionShare.of(box(0.04, 0.03, 0.02), half)
+    found = RegionShare.of(part, half)
     assert (found.boxed, found.inside) == pytest.approx(((6 + 8 + 6) / 52, (6 + 8 + 6) / 52))
     assert sorted(found.widths) == pytest.approx([0.02, 0.03])
+    assert RegionShare.of(part, Region(angle=np.pi / 2)).inside == pytest.approx(40 / 52)
+    side = RegionShare.of(part, Region(direction=(1.0, 0.0, 0.0), angle=np.radians(80.0)))
+    assert side.inside == pytest.approx(6 / 52)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -14,6 +15,7 @@ from pentapod.job import Job
 from pentapod.job.build.tool import job_tool
 from pentapod.job.build.values import job_mesh
 from pentapod.machine import Machine
+from pentapod.mesh import Mesh
 from pentapod.report.drawings.planned_run import PlannedRun
 from pentapod.report.drawings.touch_off import touch_off_points
 from pentapod.report.drawings.views import machine_drawings, setup_drawings
@@ -117,6 +119,15 @@ def test_setup_labels_are_apart_wherever_the_part_is(standing, shift, tilt):
         text = setup_drawings(run, touch_off_points(run))
         check_labels(text)
         assert [crossed(drawing) for drawing in drawings(text)] == [[]] * 4, "no leg goes through a word"
+
+
+def test_a_part_that_is_moved_is_drawn_where_it_stands_now(standing):
+    """Outlines of a mesh are remembered: each place has its own."""
+    runs = [standing("desk", (5.0, 0.0, 0.0), *turned) for turned in ((0.0, 0.0), (44.0, 0.0), (44.0, 20.0))]
+    shared = runs[0].mesh
+    for run in (*runs, runs[0]):
+        drawn, anew = replace(run, mesh=shared), replace(run, mesh=Mesh.of(shared.vertices, shared.faces))
+        assert setup_drawings(drawn, touch_off_points(drawn)) == setup_drawings(anew, touch_off_points(anew))
 
 
 @pytest.mark.parametrize("turn", [0.0, 44.0, 90.0])

@@ -67,3 +67,12 @@ def test_nodes_that_setpoints_do_not_tell_apart_are_left_out():
     assert abs(other.duration / law.duration - 1.0) < 1e-4
     t = np.linspace(0.0, law.duration, 200)
     np.testing.assert_allclose(other(t, 1), law(t, 1), atol=2e-3)
+
+
+def test_between_two_ends_nearer_than_the_least_step_the_law_goes_on():
+    """Both ends stand nearly still: a law of these alone would take hours."""
+    problem, y = parabola(0.5, 0.0, 1e6)
+    y = 0.25 - y  # x = s (1 − s)
+    nodes = problem.nodes(y)
+    assert 0.5 in nodes.s
+    assert MotionLaw.through(nodes.s, nodes.x, nodes.slope).duration < 10.0

@@ -41,8 +41,7 @@ def test_slowed_piece_is_reported_with_place_and_both_durations():
     assert told.duration == pytest.approx(trajectory.laws[1].duration, abs=1e-12)
     assert told.duration > 1.02 * told.first
     # The corner is waypoint 1, 150 mm along the path.
-    assert told.segment == 7
-    assert told.waypoints in ((0, 1), (1, 2))
+    assert (told.segment, told.waypoints) == (7, (0, 1) if told.station < 0.15 else (1, 2))
     assert 0.145 < told.station < 0.155
     words = (
         f"piece 1 lasts {told.duration:.3f} s, {100 * (told.duration / told.first - 1):.1f} % longer than its first law"

@@ -49,6 +49,6 @@ def cross_level(
             middle = 0.5 * (low + high)
             step = x - here / slope if slope != 0.0 else middle
             x = step if low < step < high and number % 4 < 3 else middle
-        for k in range(3):
+        for k in range(3):  # put onto the level, so that few vertices have to be moved there again
             normals[m, k] = away[k] / distance
             points[m, k] = p[k] + (level - distance) * normals[m, k]
