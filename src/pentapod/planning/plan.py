@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypedDict, Unpack
 
-from pentapod.base.arrays import Floats
+import numpy as np
+
+from pentapod.base.arrays import Floats, Ints
 from pentapod.base.progress import Progress, silent
 from pentapod.base.refusal import Refusal
 from pentapod.kinematics.robot import Branch
@@ -84,28 +86,40 @@ def plan(
     >>> placed.smallest_margin > 0.1
     True
     """
-    problem = PlacementProblem.of(
-        _samples(toolpath, tilt, common_axis), machine, constraints, weights,
+    samples = _samples(toolpath, tilt, common_axis)
+    whole = PlacementProblem.of(
+        samples, machine, constraints, weights,
         component=component, collision_world=collision_world, limits=limits,
     )  # fmt: skip
-    if start is None:
-        problem, found = _searched(problem, tilt, common_axis, seed, solver, progress)
-    else:
-        problem, found = _improved(problem, start)
-    best = found.best
-    if best.smallest < NEEDED_MARGIN:
-        return _refusal(toolpath, problem, best)
-    keep = max(KEPT_SHARE * best.smallest, NEEDED_MARGIN)
-    if secondary_objective is not None and (constraints.moves or problem.samples.tilt > 0.0):
-        progress("placement", 1.0, f"margin {best.smallest:.3f}; now the objective {secondary_objective}")
-        objective = objective_of(secondary_objective, problem, toolpath)
-        best = improved(SequentialSolver(problem, constraints.moves), best, objective, keep)
-    leans = problem.leans(best.coefficients)
-    if problem.samples.tilt > 0.0:
-        progress("tool axis", 0.0, f"smallest margin {best.smallest:.3f}")
-        smooth = SOLVERS[solver](problem, False).smooth(best, min(keep, best.smallest), progress)
-        leans = leans if smooth is None else AxisSpline.of(problem.samples, problem.cone).leans(smooth)
-    return _path(toolpath, problem, best, leans, found.choice)
+
+    def planned(rows: Ints) -> PlacedPath | Refusal:
+        problem = whole.at(rows)
+        if start is None:
+            problem, found = _searched(problem, tilt, common_axis, seed, solver, progress)
+        else:
+            problem, found = _improved(problem, start)
+        best = found.best
+        if best.smallest < NEEDED_MARGIN:
+            return _refusal(toolpath, problem.at_all(samples), best)
+        keep = max(KEPT_SHARE * best.smallest, NEEDED_MARGIN)
+        if secondary_objective is not None and (constraints.moves or problem.samples.tilt > 0.0):
+            progress("placement", 1.0, f"margin {best.smallest:.3f}; now the objective {secondary_objective}")
+            objective = objective_of(secondary_objective, problem, toolpath, rows)
+            best = improved(SequentialSolver(problem, constraints.moves), best, objective, keep)
+        leans = problem.leans(best.coefficients)
+        if problem.samples.tilt > 0.0:
+            progress("tool axis", 0.0, f"smallest margin {best.smallest:.3f}")
+            smooth = SOLVERS[solver](problem, False).smooth(best, min(keep, best.smallest), progress)
+            leans = leans if smooth is None else AxisSpline.of(problem.samples, problem.cone).leans(smooth)
+        everywhere = problem.at_all(samples)
+        return _path(toolpath, everywhere, best, everywhere.samples.spread(leans, rows), found.choice)
+
+    rows = samples.shaping(toolpath.starts)
+    placed = planned(rows)
+    # One that does not shape the path may all the same be out of limits.
+    if len(rows) < len(toolpath) and isinstance(placed, PlacedPath) and placed.smallest_margin < NEEDED_MARGIN:
+        placed = planned(np.arange(len(toolpath)))
+    return placed
 
 
 @on_one_thread
@@ -115,10 +129,11 @@ def fits(toolpath: Toolpath, machine: Machine, **options: Unpack[PlacementOption
     Raises KeyboardInterrupt where the search is interrupted.
     """
     tilt, common_axis = options["tilt"], options["common_axis"]
+    samples = _samples(toolpath, tilt, common_axis)
     problem = PlacementProblem.of(
-        _samples(toolpath, tilt, common_axis), machine, options["constraints"], options["weights"],
+        samples, machine, options["constraints"], options["weights"],
         component=options["component"], collision_world=options["collision_world"], limits=options["limits"],
-    )  # fmt: skip
+    ).at(samples.shaping(toolpath.starts))  # fmt: skip
     _, found = _searched(problem, tilt, common_axis, 0, options["solver"], silent)
     if found.interrupted:
         raise KeyboardInterrupt

@@ -54,7 +54,7 @@ def by_hand(name: str, machine, problem, at) -> float:
 @pytest.mark.parametrize("name", AIMS)
 def test_the_second_aim_gains_and_keeps_the_margin(name, desk, quick, found):
     problem, best = found
-    aim, keep = objective_of(name, problem, quick), 0.9 * best.smallest
+    aim, keep = objective_of(name, problem, quick, np.arange(len(quick))), 0.9 * best.smallest
     after = improved(SequentialSolver(problem, True), best, aim, keep)
     assert after.smallest >= keep - 1e-5
     assert problem.steepness(after.coefficients).max() <= 1.0 + 1e-12
@@ -67,7 +67,7 @@ def test_the_second_aim_gains_and_keeps_the_margin(name, desk, quick, found):
 def test_derivatives_of_the_aims(name, quick, found):
     """Along random directions of all unknowns, by differences of the whole aim."""
     problem, best = found
-    aim = objective_of(name, problem, quick)
+    aim = objective_of(name, problem, quick, np.arange(len(quick)))
     model = SequentialSolver(problem, True).model(best, np.arange(len(quick)), best.smallest)
     pieces, slopes = aim.pieces(best, model)
     piece = int(pieces.argmax())

@@ -27,7 +27,7 @@ STOP_ANGLE = float(np.radians(135.0))
 TOLERANCE_SHARE = 0.8
 """Share of the tolerances for blending corners; the rest is for setpoints and interpolation."""
 
-STRAIGHT_SHARE = 0.02
+STRAIGHT_SHARE = 0.1
 """Share of the tolerances within which the path between two waypoints is straight; those between are left out."""
 
 LINEAR_SHARE = 0.1

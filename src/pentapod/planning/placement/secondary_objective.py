@@ -151,11 +151,11 @@ class LeastTime:
         return np.maximum(slowest, by_feed), weights
 
 
-def objective_of(name: SecondaryObjective, problem: PlacementProblem, toolpath: Toolpath) -> Objective:
-    """Return the objective of this name for the problem of a toolpath."""
+def objective_of(name: SecondaryObjective, problem: PlacementProblem, toolpath: Toolpath, rows: Ints) -> Objective:
+    """Return the objective of this name for the problem of the waypoints `rows` (n,) of a toolpath."""
     if name == "force":
         return LeastForce(problem)
-    feeds = np.array([segment.feed for segment in toolpath.segments])[toolpath.segment_of_interval]
+    feeds = np.array([segment.feed for segment in toolpath.segments])[toolpath.segment_of_interval[rows[:-1]]]
     return LeastTime(problem, np.minimum(feeds, problem.machine.rapid_velocity))
 
 

@@ -81,6 +81,12 @@ class PlacementProblem:
         """Return the problem of the waypoints `rows` alone, with the same tilt field."""
         return replace(self, samples=self.samples.at(rows), basis=self.basis[rows])
 
+    def at_all(self, samples: ToolpathSamples) -> PlacementProblem:
+        """Return the problem of all waypoints of the path, which has the samples `samples` along its own axes."""
+        if self.samples.common_axis is not None:
+            samples = samples.towards(self.samples.common_axis)
+        return replace(self, samples=samples, basis=_basis(self.domain, samples))
+
     def on(self, machine: Machine) -> PlacementProblem:
         """Return the same problem on another machine."""
         return replace(self, machine=machine, margins=tuple(margins.on(machine) for margins in self.margins))
@@ -157,6 +163,10 @@ class PlacementProblem:
 def _field(samples: ToolpathSamples) -> tuple[FieldDomain, Floats]:
     """Return the domain of the tilt field of a path, and its basis (N, size) at the waypoints."""
     domain = FieldDomain.around(samples.tilt_centres, samples.nominal, FIELD_CELLS)
+    return domain, _basis(domain, samples)
+
+
+def _basis(domain: FieldDomain, samples: ToolpathSamples) -> Floats:
     if samples.tilt == 0.0:
-        return domain, np.zeros((len(samples.tilt_centres), 0))
-    return domain, samples.room()[:, None] * domain.basis(samples.tilt_centres)
+        return np.zeros((len(samples.tilt_centres), 0))
+    return samples.room()[:, None] * domain.basis(samples.tilt_centres)

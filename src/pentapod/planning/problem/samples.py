@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints, frozen, set_frozen
+from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.problem.common_axis import CommonAxis
 from pentapod.toolpath.toolpath import Toolpath
@@ -16,6 +17,18 @@ AXIS_LEVER_M = 0.1
 
 MOST_SAMPLED = 20_000
 """Waypoints of which representatives are chosen; longer paths are thinned first: the choice costs count × N."""
+
+DENSE_M = 1e-3
+"""Path length between the waypoints of a dense path that `shaping` keeps, metres; less on small parts."""
+
+DENSE_PER_EXTENT = 100
+"""How many of these lengths the extent of a part has at least."""
+
+STRAIGHT_M = 1e-5
+"""Distance from the straight way between neighbours up to which a waypoint does not shape a path, metres."""
+
+STRAIGHT_LEVER_M = 1e-2
+"""Path length of one radian of the nominal axis for both, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +82,27 @@ class ToolpathSamples:
         turned = placement.rotate(axes)
         return placement.apply(self.tilt_centres[rows]) - self.tilt_centre * turned, turned
 
+    def shaping(self, kept: Ints) -> Ints:
+        """Return indices (n,) of waypoints that shape the path, those in `kept` among them.
+
+        On dense paths the others are about on straight ways between neighbours that are close to each other.
+        """
+        features = np.hstack([self.tilt_centres, STRAIGHT_LEVER_M * self.nominal])
+        stations = arc_length(features)
+        extent = float(np.linalg.norm(np.ptp(self.tilt_centres, axis=0)))
+        cells = np.floor(stations / max(min(DENSE_M, extent / DENSE_PER_EXTENT), 1e-9))
+        keep = np.concatenate([[True], cells[1:] > cells[:-1]])
+        keep[kept] = keep[-1] = True
+        rows = np.flatnonzero(keep)
+        off = np.linalg.norm(features - _between(stations, stations[rows], features[rows]), axis=1)
+        bent = np.maximum.reduceat(off, rows) > STRAIGHT_M
+        return np.flatnonzero(keep | np.repeat(bent, np.diff(rows, append=len(keep))))
+
+    def spread(self, leans: Floats, rows: Ints) -> Floats:
+        """Return leans (N, 3) at all waypoints, linear along the path between those (n, 3) at waypoints `rows`."""
+        stations = arc_length(np.hstack([self.tilt_centres, STRAIGHT_LEVER_M * self.nominal]))
+        return _between(stations, stations[rows], leans)
+
     def representatives(self, count: int) -> Ints:
         """Return indices of `count` waypoints spread evenly over places and axes (farthest-point sampling)."""
         features = np.hstack([self.tilt_centres, AXIS_LEVER_M * self.nominal])
@@ -81,3 +115,8 @@ class ToolpathSamples:
             chosen.append(int(nearest.argmax()))
             nearest = np.minimum(nearest, np.square(features - features[chosen[-1]]).sum(axis=1))
         return stride[np.array(chosen, dtype=np.intp)]
+
+
+def _between(at: Floats, known: Floats, values: Floats) -> Floats:
+    """Return values (N, d) at ascending stations (N,), linear between known ones (n, d)."""
+    return np.stack([np.interp(at, known, column) for column in values.T], axis=1)
