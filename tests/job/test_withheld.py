@@ -10,14 +10,18 @@ import pytest
 import concave_parts
 from pentapod.cli.commands.new import dome_stl, job_text
 from pentapod.job import Job, run
+from pentapod.job.build.left import missed_by_drops
+from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import Reports, job_toolpath
-from pentapod.job.build.values import job_mesh
+from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.withheld import foreseen, withheld
 from pentapod.mesh.io.stl import write_stl
 from pentapod.toolpath.gouge.report import GougeReport
 from pentapod.verify import Claim, Verdict
 from pentapod.verify.replay.claim import Finding
+from pentapod.verify.surface.surface_left import SURFACE_LEFT
 from pentapod.verify.verdict.verdict import Certificate, Place
+from refused_jobs import cap
 
 TABLES = {
     "part": {"mesh": "part.stl", "unit": "mm"},
@@ -71,7 +75,7 @@ def test_a_toolpath_that_leaves_out_what_the_shank_forbids_is_refused_before_it_
     assert [stage.name for stage in outcome.stages] == ["mesh", "toolpath", "foreseen"]
     assert not (tmp_path / "out" / "program.csv").exists()
     upright = Job.from_dict({**tables, "axis": {"mode": "auto"}}, tmp_path)
-    assert foreseen(upright, job_toolpath(upright, job_mesh(upright))[1]) is None
+    assert refused_of(upright) is None
 
 
 def test_long_motions_that_the_shank_forbids_count_by_their_length(tmp_path):
@@ -79,5 +83,47 @@ def test_long_motions_that_the_shank_forbids_count_by_their_length(tmp_path):
     (tmp_path / "part.stl").write_bytes(dome_stl(cells=12))
     job = Job.from_dict({**TABLES, "axis": {"mode": "fixed", "direction": [0.0, 0.0, 1.0]}}, tmp_path)
     few = GougeReport(motions=3000, gouging=100, depths=(0.0, 5e-4, 0.0), dropped=100, dropped_share=0.19)
-    assert "on 19 % of the cuts" in str(foreseen(job, Reports((few,))))
-    assert foreseen(job, Reports((replace(few, dropped=1000, dropped_share=0.01),))) is None
+    toolpath = job_toolpath(job, job_mesh(job))[0]
+    assert "on 19 % of the cuts" in str(foreseen(job, Reports((few,)), toolpath, None))
+    assert foreseen(job, Reports((replace(few, dropped=1000, dropped_share=0.01),)), toolpath, None) is None
+
+
+def leaning(folder, degrees, lean, **tables):
+    """A job for a cap of a sphere, the tool beside its normals by `lean` mm per mm of height; the rim is forbidden."""
+    vertices, faces = cap(25.0, degrees)()
+    (folder / "part.stl").write_bytes(write_stl(vertices[faces], "cap"))
+    return Job.from_dict({**TABLES, "axis": {"mode": "fixed", "direction": [lean, 0.0, 1.0]}, **tables}, folder)
+
+
+def refused_of(job):
+    machine, mesh = job_machine(job), job_mesh(job)
+    toolpath, reports = job_toolpath(job, mesh, machine=machine)
+    return foreseen(job, reports, toolpath, job_specification(job, machine, mesh, lambda: toolpath).cutting)
+
+
+def test_what_the_passes_beside_dropped_cuts_reach_is_not_missed(tmp_path):
+    """Nearly as much is dropped of both caps; of the second the ball reaches all on its way beside that."""
+    assert "0.52 % of the region" in str(refused_of(leaning(tmp_path, 80.0, 0.3)))
+    assert refused_of(leaning(tmp_path, 75.0, 0.35)) is None
+
+
+@pytest.mark.slow
+def test_what_dropped_cuts_leave_is_about_what_the_verdict_finds(tmp_path):
+    job = leaning(tmp_path, 75.0, 0.45, tolerance={"left_share": 0.02})
+    outcome = run(job, tmp_path / "out", advice=None)
+    assert outcome.passed
+    (found,) = (each.value for each in outcome.verdict.certificates if each.claim == SURFACE_LEFT)
+    machine, mesh = job_machine(job), job_mesh(job)
+    toolpath, reports = job_toolpath(job, mesh, machine=machine)
+    (gouges,) = (each for each in reports.parts if isinstance(each, GougeReport))
+    cutting = job_specification(job, machine, mesh, lambda: toolpath).cutting
+    assert 100.0 * missed_by_drops(cutting, toolpath, gouges.dropped_centres) == pytest.approx(found, rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_tool_that_may_lean_is_advised_to_where_its_shank_would_touch(tmp_path):
+    job = leaning(tmp_path, 80.0, 0.3)
+    outcome = run(job, tmp_path / "out")
+    assert outcome.refusal.stage == "toolpath"
+    assert outcome.refusal.advice[0].tables == {"gouge": {"remedy": ["tilt", "drop"]}}
+    assert outcome.refusal.advice[0].kept == 1.0

@@ -69,7 +69,12 @@ def run(
         used, own_machine = job_machine(job, machine), machine is not None
         mesh = runner.run("mesh", lambda: job_mesh(job, progress), remark=lambda mesh: str(mesh.diagnosis))
         check_reach(job, used, mesh)
-        from pentapod.job.stages import planned, with_advice  # noqa: PLC0415  slow, and not for a part that cannot fit
+        # Slow, and not for a part that cannot fit.
+        from pentapod.job.advice.wide_parts import check_wide_part  # noqa: PLC0415
+        from pentapod.job.stages import planned, with_advice  # noqa: PLC0415
+
+        if piece is None and before is None:
+            check_wide_part(job, used, mesh)
 
         rules: Any = {"limits": tuple(limits), "claims": tuple(claims)}
         files: Any = (staging, writers or {})

@@ -30,7 +30,7 @@ from pentapod.job.task import Task
 from pentapod.job.ways.claims import with_ways
 from pentapod.job.ways.names import FILES
 from pentapod.job.ways.ways import remove_ways, ways, write_ways
-from pentapod.job.withheld import STAGE, failures, foreseen, withheld
+from pentapod.job.withheld import FORBIDDEN, STAGE, failures, foreseen, withheld
 from pentapod.machine.machine import Machine
 from pentapod.planning import PlacedPath
 from pentapod.planning.placement.placed_path import UnplacedPath
@@ -107,7 +107,8 @@ def with_advice(
         return outcome
     search = (task.job, task.machine, mesh, task.toolpath, again, options, runner.progress)
     failed = failures(outcome.verdict) if refusal.stage == STAGE else {}
-    found = runner.run("advice", lambda: advised(*search, failed, refusal.diagnosis))
+    forbidden = refusal.stage == FORBIDDEN
+    found = runner.run("advice", lambda: advised(*search, failed, refusal.diagnosis, forbidden=forbidden))
     better = refusal.with_advice(found.advice, found.sentence)
     runner.stages = [s if s.value is not refusal else s.with_value(better) for s in runner.stages]
     verdict = outcome.verdict if failed else refusal_verdict(better, task.specification.sources)
@@ -134,7 +135,7 @@ def _foreseen(task: Task, staging: Path, writers: Mapping[str, Writer]) -> Outco
     made = next((stage.value for stage in task.runner.stages if stage.name == "toolpath"), None)
     if made is None or not isinstance(made[1], Reports):  # a piece, or the toolpath of the run before
         return None
-    refusal = foreseen(task.job, made[1])
+    refusal = foreseen(task.job, made[1], task.toolpath, task.specification.cutting)
     if refusal is None:
         return None
     task.runner.stages.append(Stage("foreseen", 0.0, refusal))

@@ -93,7 +93,7 @@ class Patch:
                     "the stepover is too fine for this part",
                     key="stepover",
                     expected=f"at most {MOST_FACETS:,} facets with edges of {1e3 * longest:.3g} mm",
-                    remedy="check the unit of the mesh and the stepover",
+                    remedy="is the unit of the mesh right? If it is, take a larger stepover",
                 )
             patch = patch._halved(long)
         return patch

@@ -189,6 +189,10 @@ def test_pencil_needs_a_ball_and_a_corner(generated):
     for tool, message in ((FlatEnd(3e-3), "only a ball"), (BallCutter(6e-3), "no concave corner")):
         with pytest.raises(ToolpathError, match=message):
             toolpath_with_report(generated["box"], tool, options)
+    for asked, key in ((options, "strategy"), (replace(options, sharpest=1.5), "sharpest")):  # what the caller gave
+        with pytest.raises(ToolpathError) as error:
+            toolpath_with_report(generated["box"], BallCutter(6e-3), asked)
+        assert error.value.key == key
 
 
 @pytest.mark.parametrize("name", STRATEGIES)

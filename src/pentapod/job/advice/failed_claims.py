@@ -12,27 +12,25 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.spatial import KDTree
 
-from pentapod.base.arrays import Floats
 from pentapod.base.errors import InputError
 from pentapod.base.units import from_si, to_si
 from pentapod.cutters.mounted import BallEnded
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
-from pentapod.geometry.polyline import spaced
-from pentapod.job.advice.axes import Changes
+from pentapod.job.advice.axes import OF_MODES, Changes, taken_out
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.parts import Regions
 from pentapod.job.advice.settings import Tell, merged
 from pentapod.job.advice.trials import Trial
-from pentapod.job.build.specification import job_coverage
+from pentapod.job.build.left import spread, uncovered
+from pentapod.job.build.specification import job_collision_world, job_coverage, job_cutting
 from pentapod.job.build.tool import job_tool
 from pentapod.job.build.toolpath import drops_gouges, job_toolpath
 from pentapod.job.schema.job import Job
+from pentapod.job.withheld import foreseen
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.patch import Patch
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 from pentapod.verify.claims import gouge, slowness
 from pentapod.verify.surface import surface_left
@@ -76,6 +74,31 @@ class FailedClaims:
         kept = self._kept(changes)
         if kept > 0.0:
             yield Trial("only where an upright tool has room", changes, min(kept, 1.0), kept)
+
+    def reaching(self) -> Iterator[Trial]:
+        """Yield the job with axes along which shank and holder are clear, where they forbid what the ball reaches."""
+        view = [float(v) for v in normalised(self.job.part.si.region_direction)]
+        along = {**taken_out(self.job, "axis", OF_MODES), "mode": "fixed", "direction": view}
+        tries: list[tuple[str, Changes]] = []
+        if self._tool.can_tilt:
+            remedy = {"gouge": {"remedy": ["tilt", "drop"]}}
+            tries.append(("the tool leans where shank or holder would touch the part", remedy))
+        if self.job.axis.mode == "fixed":
+            tries.append(("one direction of the tool for the whole path", {"axis": along}))
+        for words, changes in tries:
+            self.tell(words)
+            if not self._forbidden(changes):
+                yield Trial(words, changes, 1.0, 1.0)
+
+    def _forbidden(self, changes: Changes) -> bool:
+        """Return whether shank or holder forbid what the ball reaches with changes, or no toolpath can be made."""
+        try:
+            job = self.job.with_(**changes)
+            toolpath, reports = job_toolpath(job, self.mesh, machine=self.machine)
+            cutting = job_cutting(job, job_collision_world(job, self.machine, self.mesh), self.machine)
+        except InputError:
+            return True
+        return foreseen(job, reports, toolpath, cutting) is not None
 
     def _without_gouges(self) -> Iterator[Trial]:
         """Yield the job without the motions that gouge, with the share of its cuts that are kept."""
@@ -166,10 +189,9 @@ class FailedClaims:
         tool = job_tool(job, self.machine)
         if coverage.region is None or not isinstance(tool, BallEnded) or not len(coverage.region.faces):
             return 0.0
-        points, normals = _spread(coverage.region, self.options.surface_points)
-        centres = spaced(toolpath.tilt_centres, self.options.near_share * tool.radius)
-        gaps = KDTree(centres).query(points + coverage.left * normals)[0]
-        return float(np.mean(np.asarray(gaps) > tool.radius))
+        points, normals = spread(coverage.region, self.options.surface_points)
+        above = points + coverage.left * normals
+        return float(np.mean(uncovered(above, toolpath.tilt_centres, tool.radius, self.options.near_share)))
 
 
 def _toolpath_of(job: Job, changes: Changes, machine: Machine, mesh: Mesh) -> Toolpath | None:
@@ -185,16 +207,6 @@ def _cut_length(toolpath: Toolpath) -> float:
     steps = np.linalg.norm(np.diff(toolpath.tilt_centres, axis=0), axis=1)
     kinds = np.array([toolpath.segments[k].kind is SegmentKind.CUT for k in toolpath.segment_of_interval])
     return float(steps[kinds].sum())
-
-
-def _spread(region: Patch, count: int) -> tuple[Floats, Floats]:
-    """Return about `count` points of a region, evenly by area, and the normals there."""
-    corners = region.vertices[region.faces]
-    rng, edges = np.random.default_rng(0), np.cumsum(region.areas)
-    facets = np.searchsorted(edges, (np.arange(count) + 0.5) * edges[-1] / count)
-    root, share = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
-    a, b, c = (corners[facets, k] for k in range(3))
-    return (1.0 - root) * a + root * (1.0 - share) * b + root * share * c, region.facet_normals[facets]
 
 
 def _shorter(length: float) -> float:

@@ -74,11 +74,13 @@ def advised(
     progress: Progress,
     failed: Mapping[str, Certificate] = MappingProxyType({}),
     short: Sequence[Shortfall] = (),
+    *,
+    forbidden: bool = False,
 ) -> Advised:
     """Return changes with which a job that cannot be done is planned, and its verdict passes.
 
     machine, mesh: the job's. toolpath: None where none could be made. failed: claims about its program that fail;
-    short: limits that its placement exceeds.
+    short: limits that its placement exceeds. forbidden: whether shank or holder forbid what its ball reaches.
     """
     found: list[Advice] = []
     tried: dict[str, None] = {}
@@ -98,7 +100,8 @@ def advised(
     if toolpath is not None:
         claims = FailedClaims(job, machine, mesh, toolpath, failed, options, tell)
         touches = any(each.constraint.startswith(TOUCHES) for each in short)
-        trials = chain(claims.upright() if touches else (), claims.all(), trials)
+        first = claims.upright() if touches else claims.reaching() if forbidden else ()
+        trials = chain(first, claims.all(), trials)
     try:
         for number, trial in enumerate(islice(trials, count)):
             tried[trial.words] = None

@@ -183,6 +183,10 @@ class Settings:
         alike = [each for each in kinds if _cone(each.common_axis) == _cone(own)]
         return self._best(alike or kinds, base.place, near, obstacles=obstacles)
 
+    def without_obstacles(self) -> Estimate:
+        """Return the estimate for the whole task with the job's own axes and placement, without part and fixture."""
+        return self._best(self.axes[0].kinds(self.sketch), self.places[0], None, obstacles=False)
+
     def fits(self, found: Estimate | None) -> bool:
         """Return whether an estimate is good enough for a plan."""
         return found is not None and found.margin >= self.options.enough

@@ -13,7 +13,7 @@ from pentapod.base.errors import InputError
 from pentapod.geometry.directions import normalised
 from pentapod.job.advice.axes import OF_MODES, Changes, taken_out
 from pentapod.job.advice.options import AdviceOptions
-from pentapod.job.build.reach import check_reach
+from pentapod.job.advice.wide_parts import is_too_large
 from pentapod.job.build.region import covers_region, job_region
 from pentapod.job.build.toolpath import job_toolpath, removes_gouges
 from pentapod.job.build.values import job_mesh
@@ -66,7 +66,7 @@ def starts(
     key = "region"
     if region:
         yield from _of_other_size(job, machine, mesh, options)
-        if has_toolpath or _is_too_large(own, machine):
+        if has_toolpath or is_too_large(job, machine, mesh):
             yield own
             return
         made = _with_toolpath(own, machine)
@@ -80,15 +80,6 @@ def starts(
         made = _with_toolpath(start, machine)
         if isinstance(made, Start):
             yield made
-
-
-def _is_too_large(own: Start, machine: Machine) -> bool:
-    """Return whether a region is beyond the machine's reach: no toolpath of all of it is needed."""
-    try:
-        check_reach(own.job, machine, own.mesh)
-    except InputError:
-        return True
-    return False
 
 
 def _with_toolpath(start: Start, machine: Machine) -> Start | InputError:

@@ -64,7 +64,7 @@ def offset_surface(
     grid, groups = _grid(tree, distance, step)
     blocks = _Blocks.of(grid, groups, window)
     if int(np.prod(blocks.high - blocks.low)) > MOST_BLOCKS:
-        raise _too_fine(step)
+        raise _too_fine(tree, step)
     keys, outside, wide = _nodes(tree, grid, blocks, distance)
     nodes = Nodes.of(grid, keys, outside)
     vertices, triangles = _contour(tree, nodes, blocks, wide, distance)
@@ -155,15 +155,17 @@ def _grid(tree: FacetTree, distance: float, step: float) -> tuple[Grid, Ints]:
     size = tree.extents[0, 1] + distance + 2.0 * step - low
     groups = np.ceil(size / (_GROUP * _BLOCK * step))
     if float(np.log2(_GROUP * _BLOCK * groups + 1.0).sum()) > _KEY_BITS:
-        raise _too_fine(step)
+        raise _too_fine(tree, step)
     return Grid(low, step, (_GROUP * _BLOCK * groups).astype(np.intp) + 1), groups.astype(np.intp)
 
 
-def _too_fine(step: float) -> MeshError:
+def _too_fine(tree: FacetTree, step: float) -> MeshError:
+    """Return the error of a grid with too many nodes: most often the unit of the mesh is wrong."""
+    width = 1e3 * float(np.ptp(tree.extents[0], axis=0).max())
     return MeshError(
-        "the offset surface is too fine for this part", key="step", value=step,
+        f"the offset surface is too fine for this part, which is {width:,.0f} mm wide", key="step", value=step,
         expected=f"at most {MOST_NODES:,} nodes near the surface, {MOST_BLOCKS:,} blocks of {_BLOCK}³ around it",
-        remedy="check the unit of the mesh and the size of the tool",
+        remedy="is the unit of the mesh right? If it is, take a larger tool, or less of the part",
     )  # fmt: skip
 
 
@@ -191,7 +193,7 @@ def _nodes(tree: FacetTree, grid: Grid, blocks: _Blocks, level: float) -> tuple[
     wide[tuple((block - blocks.low).T)] = out
     block = block[near]
     if len(block) * _BLOCK**3 > MOST_NODES:
-        raise _too_fine(grid.step)
+        raise _too_fine(tree, grid.step)
     within = np.indices((_BLOCK + 1,) * 3).reshape(3, -1).T
     keys = (grid.keys(_BLOCK * block)[:, None] + grid.keys(within)).ravel()
     keys.sort()

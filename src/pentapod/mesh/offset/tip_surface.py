@@ -89,12 +89,15 @@ class Lowered:
         size = np.ceil((extent[1] + [wide, wide, 0.0] - low) / step).astype(np.intp) + 3
         grid = Grid(low, step, size)
         if size.prod() > 100 * MOST_NODES:
-            raise _too_fine(step)
+            raise _too_fine(self.tree, step)
         columns = np.indices(tuple(size[:2])).reshape(2, -1).T
         places = low[:2] + step * columns
         heights, normals = self.heights(places)
         top = np.floor((np.maximum(heights, low[2] - step) - low[2]) / step).astype(np.intp)
-        keys, outside = _nodes(top.reshape(tuple(size[:2])), size)
+        nodes = _nodes(top.reshape(tuple(size[:2])), size)
+        if nodes is None:
+            raise _too_fine(self.tree, step)
+        keys, outside = nodes
         crossings = self._crossings(grid, columns, top, heights, normals)
         vertices, triangles, _ = dual_contour(Cells(grid, 1, np.empty(0, dtype=np.intp)), keys, outside, crossings)
         normals = _vertex_normals(vertices, triangles)
@@ -143,15 +146,18 @@ class Lowered:
         return tips + np.array([0.0, 0.0, self.radius])
 
 
-def _nodes(top: Ints, size: Ints) -> tuple[Ints, Bools]:
-    """Return ascending keys of the nodes near the surface, and whether they are outside. top: as in `_crossings`."""
+def _nodes(top: Ints, size: Ints) -> tuple[Ints, Bools] | None:
+    """Return ascending keys of the nodes near the surface, and whether they are outside; None for too many.
+
+    top: as in `_crossings`.
+    """
     padded = np.pad(top, 1, mode="edge")
     around = np.stack([padded[i : i + top.shape[0], j : j + top.shape[1]] for i in range(3) for j in range(3)])
     first = np.maximum(around.min(axis=0), 0).ravel()
     last = np.minimum(around.max(axis=0) + 1, size[2] - 1).ravel()
     counts = np.where(around.max(axis=0).ravel() >= 0, last - first + 1, 0)
     if counts.sum() > MOST_NODES:
-        raise _too_fine(float("nan"))
+        return None
     column, number = members(counts)
     level = first[column] + number
     return column * size[2] + level, np.asarray(level > top.ravel()[column])
@@ -165,8 +171,11 @@ def _vertex_normals(vertices: Floats, triangles: Ints) -> Floats:
     return unit_or_zero(normals)
 
 
-def _too_fine(step: float) -> MeshError:
+def _too_fine(tree: FacetTree, step: float) -> MeshError:
+    """Return the error of a grid with too many nodes: most often the unit of the mesh is wrong."""
+    width = 1e3 * float(np.ptp(tree.extents[0], axis=0).max())
     return MeshError(
-        "the tip surface is too fine for this part", key="step", value=step, expected=f"at most {MOST_NODES:,} nodes",
-        remedy="check the unit of the mesh and the size of the tool",
+        f"the tip surface is too fine for this part, which is {width:,.0f} mm wide", key="step", value=step,
+        expected=f"at most {MOST_NODES:,} nodes",
+        remedy="is the unit of the mesh right? If it is, take a larger tool, or less of the part",
     )  # fmt: skip

@@ -45,7 +45,7 @@ def spread(low: Floats, high: Floats, density: Floats) -> Floats:
             "the passes are too dense for this mesh",
             key="stepover",
             expected=f"at most {MOST_LEVELS:,} levels",
-            remedy="check the unit of the mesh and the stepover",
+            remedy="is the unit of the mesh right? If it is, take a larger stepover",
         )
     count = max(1, int(np.ceil(total[-1] * (1.0 - 1e-9))))
     return np.interp((np.arange(count) + 0.5) * (total[-1] / count), total, bins)

@@ -58,7 +58,8 @@ def without_gouges(
             report = replace(report, lifted=lifted, most_lifted=most)
         elif remedy is Remedy.DROP:
             dropped = removal.drop(bad)
-            report = replace(report, dropped=dropped, dropped_share=removal.dropped_share())
+            lost = {"dropped_share": removal.dropped_share(), "dropped_centres": removal.dropped_centres()}
+            report = replace(report, dropped=dropped, **lost)
         bad = removal.gouging()
     result = removal.toolpath() if report.gouging else toolpath
     depths, cutting = removal.all_depths(result)
@@ -204,6 +205,11 @@ class _GougeRemoval:
         places = self.path.tilt_centres - self.tree.closest(self.path.tilt_centres)[1]
         lengths = np.where(self.cut, np.linalg.norm(np.diff(places, axis=0), axis=1), 0.0)
         return float(lengths[self.dropped].sum() / max(lengths.sum(), np.finfo(np.float64).tiny))
+
+    def dropped_centres(self) -> Floats:
+        """Return the tilt centre at both ends (n, 2, 3) of each motion that is dropped."""
+        centres = self.path.tilt_centres
+        return np.stack([centres[:-1], centres[1:]], axis=1)[self.dropped]
 
     def _kept(self) -> Bools:
         """Return which waypoints (N,) belong to a cut that is not dropped."""

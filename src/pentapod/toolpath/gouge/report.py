@@ -8,6 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
+from pentapod.base.arrays import Floats
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import Key, check_fields
 from pentapod.base.values import Value
@@ -79,8 +80,8 @@ class GougeReport(Value):
 
     gouging: how many of them gouged at first; depths: of the deepest gouge of cutter, shank and holder, metres, −inf
     for none. tilted, lifted: number of waypoints changed; most_lifted: metres. dropped: number of motions taken out of
-    the cut; dropped_share: of the length of all cuts,
-    along the part. left: number of motions that still gouge; left_depth: how deep,
+    the cut; dropped_share: of the length of all cuts, along the part; dropped_centres (n, 2, 3): the tilt centre at
+    both ends of each of them, workpiece frame, metres. left: number of motions that still gouge; left_depth: how deep,
     metres; places: first waypoint of each run of them. relinked: number of links replaced. stuck: number of motions of
     cuts that were left out, as the tool cannot leave them. unclear: number of links that gouge and rapids that touch;
     unclear_places: first waypoint of each run of them.
@@ -94,6 +95,7 @@ class GougeReport(Value):
     most_lifted: float = 0.0
     dropped: int = 0
     dropped_share: float = 0.0
+    dropped_centres: Floats = field(default_factory=lambda: np.zeros((0, 2, 3)), repr=False)
     left: int = 0
     left_depth: float = 0.0
     places: tuple[int, ...] = ()

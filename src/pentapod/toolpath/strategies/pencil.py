@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
+import numpy as np
+
 from pentapod.base.errors import ToolpathError
 from pentapod.base.keys import Key
 from pentapod.toolpath.lines.sharp_edges import CreaseOptions, crease_lines
@@ -40,8 +42,11 @@ def pencil_paths(surface: Surface, options: PencilOptions) -> ContactPaths:
     lines = crease_lines(region_patch(surface, options), options.sharpest)
     lines = lines.where(lines.lengths >= max(options.shortest, surface.radius))
     if not len(lines):
+        given = options.sharpest != CreaseOptions.sharpest
+        key, value = ("sharpest", options.sharpest) if given else ("strategy", "pencil")
         raise ToolpathError(
-            "the region has no concave corner for this ball", key="sharpest", value=options.sharpest,
+            "the region has no concave corner for this ball", key=key, value=value,
+            expected=f"a corner that a ball touches on two sides, {np.degrees(options.sharpest):.3g} deg apart or more",
             remedy="take a larger ball, or a strategy that covers the surface",
         )  # fmt: skip
     return ContactPaths(lines)

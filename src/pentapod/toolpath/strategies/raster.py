@@ -125,7 +125,7 @@ def plane_lines(surface: Surface, patch: Patch, options: CoverOptions, across: F
             key="stepover" if options.scallop is None else "scallop",
             value=options.stepover if options.scallop is None else options.scallop,
             expected=f"at most {MOST_CROSSINGS:,} crossings of passes with facets",
-            remedy="check the unit of the mesh and the stepover",
+            remedy="is the unit of the mesh right? If it is, take a larger stepover",
         )
     passes = level_set.lines()
     if options.fill:

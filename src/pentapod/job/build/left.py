@@ -1,0 +1,70 @@
+"""What a job leaves on its region, estimated at points before there is a program: where its ball has not been."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from pentapod.base.arrays import Bools, Floats
+from pentapod.geometry.polyline import spaced
+from pentapod.mesh.patch import Patch
+from pentapod.toolpath.toolpath import Toolpath
+from pentapod.verify import Cutting
+from pentapod.verify.surface.reachable import nearest_centres
+
+
+@dataclass(frozen=True)
+class LeftOptions:
+    """How what is left is estimated.
+
+    points: of a region, evenly by area. near: steps along the path, in radii of the ball. touches: metres by which the
+    nearest place of the ball may be off a point that it touches.
+    """
+
+    points: int = 40_000
+    near: float = 0.05
+    touches: float = 1e-6
+
+
+def spread(region: Patch, count: int) -> tuple[Floats, Floats]:
+    """Return about `count` points of a region, evenly by area, and the normals there."""
+    corners = region.vertices[region.faces]
+    rng, edges = np.random.default_rng(0), np.cumsum(region.areas)
+    facets = np.searchsorted(edges, (np.arange(count) + 0.5) * edges[-1] / count)
+    root, share = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
+    a, b, c = (corners[facets, k] for k in range(3))
+    return (1.0 - root) * a + root * (1.0 - share) * b + root * share * c, region.facet_normals[facets]
+
+
+def uncovered(points: Floats, path: Floats, radius: float, near: float) -> Bools:
+    """Return above which points (N, 3) the centre of a ball never is within its radius, on its way along a path (M, 3).
+
+    near: steps along the path, radii.
+    """
+    return np.asarray(KDTree(spaced(path, near * radius)).query(points)[0]) > radius
+
+
+def missed_by_drops(
+    cutting: Cutting, toolpath: Toolpath, dropped: Floats, options: LeftOptions = LeftOptions()
+) -> float:
+    """Return about the share of a ball's region that its toolpath misses since motions (n, 2, 3) were dropped.
+
+    That is where a verdict finds that the ball could have been: it touches the part there, and can be retracted.
+    """
+    coverage, radius = cutting.coverage, cutting.cutter[0].rounding
+    if coverage is None or coverage.region is None or not len(coverage.region.faces) or not len(dropped):
+        return 0.0
+    points, normals = spread(coverage.region, options.points)
+    above = points + coverage.left * normals
+    motions = np.concatenate([spaced(motion, options.near * radius) for motion in dropped])
+    left = np.flatnonzero(np.asarray(KDTree(motions).query(above)[0]) <= radius)
+    left = left[uncovered(above[left], toolpath.tilt_centres, radius, options.near)]
+    if not len(left):
+        return 0.0
+    at = points[left]
+    first = np.array([0.0, coverage.left])
+    centres = nearest_centres(cutting.surface, at, normals[left], radius, coverage.up, first)
+    touching = np.linalg.norm(centres - at, axis=1) <= radius + options.touches  # NaN: no place was found
+    return float(touching.sum()) / len(points)
