@@ -1,10 +1,10 @@
 """Stairs of ends: how far apart passes of a bull-nose or flat end of fixed axis may be on slopes.
 
 On a plane across its axis an end leaves nothing between passes. On a slope it leaves stairs. The end is a disc grown by
-its corner's radius, and all above it. Cut by a plane at a height h₁ above a slope of angle θ, what is above the disc is
-a segment of an ellipse: v from disc − h₁ / sin θ to disc uphill, as seen along the axis, and v / cos θ along the slope.
-The corner's ball adds its own chord at what is left of the height. Two passes leave the height at which this is as wide,
-across them, as they are apart.
+its corner's radius, and all above it. Cut by a plane at a height h₁ above a slope of angle θ, what is above the disc
+is a segment of an ellipse: v from disc − h₁ / sin θ to disc uphill, seen along the axis, and v / cos θ along the slope.
+The corner's ball adds its own chord at what is left of the height. Two passes leave the height at which this is as
+wide, across them, as they are apart.
 """
 
 from __future__ import annotations

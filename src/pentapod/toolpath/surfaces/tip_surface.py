@@ -124,7 +124,7 @@ class TipSurface(RolledSurface):
         return patch.trimmed_at(quantity(normals), root)
 
     def _exact_normals(self, points: Floats) -> tuple[Floats, Bools]:
-        """Return normals (N, 3) where the cutter rests at points (N, 3); and where it does, as the surface is no jump."""
+        """Return normals (N, 3) where the cutter rests at points (N, 3), and at which it does: not at jumps."""
         lowered, frame = self.tips.lowered, self.tips.frame
         local = points @ frame.T
         heights, normals = lowered.heights(local[:, :2])
