@@ -115,11 +115,14 @@ class LimitSurface:
     ) -> LimitSurface:
         """Return the limit surface of another cutter: the highest of a few heights that it cannot reach, or none.
 
-        It stands as the program has it nearby, or along the normals, unless its axis must keep one direction. Nothing
-        is known of its normals: those of the part stand for them.
+        It stands as the program has it nearby, or along the normals, unless its axis must keep one direction: then its
+        tip stays above the lowest point of the part, below which is what the part stands on. Nothing is known of its
+        normals: those of the part stand for them.
         """
         axes = replay.axes[np.asarray(KDTree(replay.tilt_centres).query(points)[1])]
-        ways = (axes,) if coverage.one_direction and _keeps_its_axis(replay) else (axes, normals)
+        ways, lowest = (axes, normals), -np.inf
+        if coverage.one_direction and _keeps_its_axis(replay):
+            ways, lowest = (axes,), float((cutting.surface.mesh.vertices @ axes[0]).min())
         steps = np.linspace(0.0, coverage.left, options.steps + 1)
         heights = np.full(len(points), np.nan)
         for below, height in zip([0.0, *steps[:-1]], steps, strict=True):
@@ -127,7 +130,8 @@ class LimitSurface:
                 open_ = np.flatnonzero(np.isnan(heights))
                 if len(open_):
                     at, up = points[open_] + height * normals[open_], normals[open_]
-                    heights[open_[body_reaches(cutting.surface, cutting.cutter, at, along[open_], up)]] = below
+                    reached = body_reaches(cutting.surface, cutting.cutter, at, along[open_], up, lowest)
+                    heights[open_[reached]] = below
         return cls(heights, points + heights[:, None] * normals, normals)
 
 

@@ -162,11 +162,13 @@ def body_reaches(
     points: Floats,
     axes: Floats,
     normals: Floats,
+    lowest: float = -np.inf,
     options: ReachOptions = ReachOptions(),
 ) -> Bools:
     """Return which points (N, 3) the end of a cutter can contain without gouging, and be retracted along its axis.
 
-    axes (N, 3): unit, of the tool; normals (N, 3): of the surface below. A few positions on the end are tried.
+    axes (N, 3): unit, of the tool; normals (N, 3): of the surface below. lowest: height along the axes, metres, below
+    which the tip must not be. A few positions on the end are tried.
     """
     body = TouchingBody(solids)
     wide = max(solid.largest_radius for solid in solids)
@@ -179,16 +181,23 @@ def body_reaches(
     end = min(solids, key=lambda solid: solid.low - solid.rounding)
     corner = end.rounding * (normals - axes)
     turns = [lean, *(np.cos(a) * first + np.sin(a) * second for a in _angles(options.around))]
-    for share, up in options.places:
-        # On the rounding, at a share `up` of its width, the end is higher than at its bottom.
-        aside_by, drop = share * end.low_radius + up * end.rounding, end.rounding * (1.0 - np.sqrt(1.0 - up**2))
+    # On the rounding, at a share `up` of its width, the end is higher than at its bottom.
+    places = [(share, np.full(len(points), up)) for share, up in options.places]
+    if np.isfinite(lowest) and end.rounding > 0.0:
+        stands = np.clip((np.einsum("ij,ij->i", points, axes) - lowest) / end.rounding, 0.0, 1.0)
+        places.append((1.0, np.sqrt(1.0 - (1.0 - stands) ** 2)))  # the tip as low as it may be
+    for share, up in places:
+        aside_by = (share * end.low_radius + up * end.rounding)[:, None]
+        drop = (end.rounding * (1.0 - np.sqrt(1.0 - up**2)))[:, None]
         for k, aside in enumerate(turns[: 1 if share == 0.0 else None]):
             open_ = np.flatnonzero(~reached)
             if not len(open_):
                 return reached
-            tips = points[open_] + aside_by * aside[open_] - drop * axes[open_]
-            if k == 0 and (share, up) == (1.0, 0.0):
+            tips = points[open_] + aside_by[open_] * aside[open_] - drop[open_] * axes[open_]
+            if k == 0 and share == 1.0 and not up.any():
                 tips += corner[open_]  # so that the rounding touches where the tool leans
+            high = np.einsum("ij,ij->i", tips, axes[open_]) >= lowest - options.slack_m
+            open_, tips = open_[high], tips[high]
             both = np.stack([tips, tips + length * axes[open_]], axis=1)
             free = ~touch(surface.tree, body, tips, axes[open_], threshold=options.depth_m).beyond(options.depth_m)
             open_, both = open_[free], both[free].reshape(-1, 3)
