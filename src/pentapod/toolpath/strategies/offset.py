@@ -114,18 +114,13 @@ def distance_field(
         # Over the region's own facets: distances are exact inside them, and there are fewer.
         field = _distance(region, None if from_curve is None else from_curve.placed(drawn), 1.0 / options.stepover)
         at_vertices, inside = drawn.at_vertices(field.at), drawn.carried(field.at)
-        steps = surface.steps(patch, _growing(patch, at_vertices), options)
-        if (steps == options.stepover).all():
-            return DistanceField(drawn, steps, at_vertices, inside, from_curve, line)
-    else:
-        steps = surface.steps(patch, _growing(patch, _distance(patch, from_curve, 1.0).values), options)
+        steps = np.full(len(patch.faces), options.stepover)
+        return DistanceField(drawn, steps, at_vertices, inside, from_curve, line)
+    metres = _distance(patch, from_curve, 1.0).values
+    growing = gradients(patch, np.where(np.isfinite(metres), metres, 0.0)[patch.faces])
+    steps = surface.steps(patch, growing, options)
     field = _distance(patch, from_curve, slowness_of(patch, steps))
     return DistanceField(drawn, steps, field.values, field.at, from_curve, line)
-
-
-def _growing(patch: Patch, distance: Floats) -> Floats:
-    """Return the direction (F, 3) in which a distance (V,) grows on each facet."""
-    return gradients(patch, np.where(np.isfinite(distance), distance, 0.0)[patch.faces])
 
 
 def _distance(patch: Patch, curve: Sources | None, slowness: Floats | float) -> GeodesicField:

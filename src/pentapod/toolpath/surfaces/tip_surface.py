@@ -6,14 +6,13 @@ for the normal there: with the fixed axis each cutter's tip is then where it sho
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.arrays import Bools, Floats
 from pentapod.cutters.bull_nose import BullNose
 from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.mesh import Mesh
@@ -23,9 +22,7 @@ from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.mesh.region import Region
-from pentapod.mesh.trimming import normal_root
-from pentapod.toolpath.lines.stairs import end_stepover
-from pentapod.toolpath.options import CoverOptions, PathOptions
+from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.surfaces.places import DriveOptions
 from pentapod.toolpath.surfaces.rolled_surface import RolledSurface
 from pentapod.toolpath.surfaces.tip_places import TipPlaces
@@ -93,55 +90,8 @@ class TipSurface(RolledSurface):
                 for k in range(3):
                     contacts = self._touched(patch)
                     patch, _ = patch.above(side * (contacts[:, k] - bound[k]), 0.0)
-        patch = self._facing(patch, partial(region.faces, default=0.5 * np.pi))
+        patch = patch.where_normals(partial(region.faces, default=0.5 * np.pi))
         return patch if self.part.topology.watertight else patch.above(-self._beyond_border(patch), 0.0)[0]
-
-    def _facing(self, patch: Patch, quantity: Callable[[Floats], Floats]) -> Patch:
-        """Return the part where a quantity of the surface's normal, (..., 3) to (...), is not negative.
-
-        Normals of vertices are means of those around, and turn too early beside the foot of a wall: where the surface
-        has no jump, they are those of what holds the cutter.
-        """
-        at, exact = self._exact_normals(patch.vertices)
-        normals = np.where(exact[patch.faces][..., None], at[patch.faces], patch.normals)
-        by_mean = normal_root(quantity, normals)
-
-        def root(facet: Ints, a: Ints, b: Ints) -> Floats:
-            found = by_mean(facet, a, b)
-            first, last = patch.faces[facet, a], patch.faces[facet, b]
-            rows = np.flatnonzero(exact[first] & exact[last])
-            start, way = patch.vertices[first[rows]], patch.vertices[last[rows]] - patch.vertices[first[rows]]
-            low, high = np.zeros(len(rows)), np.ones(len(rows))
-            inside = quantity(at[first[rows]]) >= 0.0
-            for _ in range(self.options.rounds):
-                middle = 0.5 * (low + high)
-                there = self._exact_normals(start + middle[:, None] * way)[0]
-                same = (quantity(there) >= 0.0) == inside
-                low, high = np.where(same, middle, low), np.where(same, high, middle)
-            found[rows] = np.where(inside, low, high)
-            return found
-
-        return patch.trimmed_at(quantity(normals), root)
-
-    def _exact_normals(self, points: Floats) -> tuple[Floats, Bools]:
-        """Return normals (N, 3) where the cutter rests at points (N, 3), and at which it does: not at jumps."""
-        lowered, frame = self.tips.lowered, self.tips.frame
-        local = points @ frame.T
-        heights, normals = lowered.heights(local[:, :2])
-        return normals @ frame, np.abs(heights - local[:, 2]) <= self.options.border * self.radius
-
-    def steps(self, patch: Patch, across: Floats, options: CoverOptions) -> Floats:
-        """Return the stepover (F,) on each facet of the surface; on slopes the corner leaves no higher stairs by it.
-
-        They are not higher than the ridge that a ball as wide as the cutter leaves on a plane. Raises ToolpathError as
-        `surface_steps`.
-        """
-        steps, asked, lowered = super().steps(patch, across, options), options.stepover, self.tips.lowered
-        if asked is None or 0.5 * asked <= lowered.radius:
-            return steps
-        height = self.radius - float(np.sqrt(max(self.radius**2 - 0.25 * asked**2, 0.0)))
-        widest = end_stepover(height, lowered.radius, lowered.disc, self.tips.axis, patch.facet_normals, across)
-        return np.minimum(steps, widest)
 
     @property
     def _lowest(self) -> float:
