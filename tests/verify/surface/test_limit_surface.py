@@ -8,6 +8,7 @@ from raster_cases import UP, along, judged, pocket, raster
 from concave_parts import mesh
 from left_material import Reachable
 from pentapod.cutters.ball import BallCutter
+from pentapod.cutters.bull_nose import BullNose
 from pentapod.cutters.flat_end import FlatEnd
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
@@ -186,6 +187,21 @@ def test_a_flat_end_that_must_keep_one_direction_answers_for_no_wall_under_a_led
     found = judged(replay, ledge(12e-3), tool, 0.25e-3, region=wall, tilt=tilt, one_direction=kept)
     assert found.value == pytest.approx(missed)
     assert ("100 % more is hidden by overhangs" in found.method) == (missed == 0.0)
+
+
+@pytest.mark.parametrize(("above", "missed"), [(0.0, 0.0), (1.5e-3, 0.4)])
+def test_a_bull_end_leaves_its_fillet_at_the_foot_of_an_outer_wall_and_no_more(above, missed):
+    """A tip at the part's lowest point leaves corner − √(corner² − (corner − z)²) beside a wall at a height of z."""
+    corner, left, high = 3e-3, 0.25e-3, 3e-3
+    tool, block = BullNose(5e-3, corner), trimesh.creation.box(bounds=[(0.0, 0.0, 0.0), (0.02, 0.02, 0.01)])
+    part = Mesh.of(block.vertices, block.faces)
+    wall = Region(box=((-1e-4, 8e-3, 0.0), (1e-4, 12e-3, high)), direction=(-1.0, 0.0, 0.0))
+    lines = [np.array([[x, -8e-3, above], [x, 0.028, above]])[:: (-1) ** k] for k, x in enumerate((-6e-3, -5e-3))]
+    found = judged(along(*lines, tool=tool), part, tool, left, region=wall, tilt=0.0, one_direction=True)
+    assert found.value == pytest.approx(100.0 * missed, rel=0.05, abs=0.2)
+    fillet = corner - np.sqrt(corner**2 - (corner - left) ** 2)
+    share = float(found.method.split(" % more is hidden by overhangs")[0].split("; ")[-1])
+    assert share == pytest.approx(100.0 * fillet / high, rel=0.05)
 
 
 def test_a_wall_that_leans_under_must_be_cut_as_far_down_as_a_ball_from_above_comes_near():
