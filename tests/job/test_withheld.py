@@ -10,11 +10,11 @@ import pytest
 import concave_parts
 from pentapod.cli.commands.new import dome_stl, job_text
 from pentapod.job import Job, run
-from pentapod.job.build.left import missed_by_drops
+from pentapod.job.build.left import foreseen, missed_by_drops
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import Reports, job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
-from pentapod.job.withheld import foreseen, withheld
+from pentapod.job.withheld import withheld
 from pentapod.mesh.io.stl import write_stl
 from pentapod.toolpath.gouge.report import GougeReport
 from pentapod.verify import Claim, Verdict

@@ -12,6 +12,7 @@ from pentapod.base.refusal import Refusal
 from pentapod.job.advice.options import AdviceOptions, Tried
 from pentapod.job.advice.search import TOUCHES, advised
 from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, write_arrays, write_json
+from pentapod.job.build.left import FORBIDDEN, foreseen
 from pentapod.job.build.limits import pose_limits, timing_limits
 from pentapod.job.build.pieces import job_part, job_piece, job_without
 from pentapod.job.build.region import covers_region
@@ -30,7 +31,7 @@ from pentapod.job.task import Task
 from pentapod.job.ways.claims import with_ways
 from pentapod.job.ways.names import FILES
 from pentapod.job.ways.ways import remove_ways, ways, write_ways
-from pentapod.job.withheld import FORBIDDEN, STAGE, failures, foreseen, withheld
+from pentapod.job.withheld import STAGE, failures, withheld
 from pentapod.machine.machine import Machine
 from pentapod.planning import PlacedPath
 from pentapod.planning.placement.placed_path import UnplacedPath

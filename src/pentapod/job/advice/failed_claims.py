@@ -23,12 +23,11 @@ from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.parts import Regions
 from pentapod.job.advice.settings import Tell, merged
 from pentapod.job.advice.trials import Trial
-from pentapod.job.build.left import spread, uncovered
+from pentapod.job.build.left import foreseen, spread, uncovered
 from pentapod.job.build.specification import job_collision_world, job_coverage, job_cutting
 from pentapod.job.build.tool import job_tool
 from pentapod.job.build.toolpath import drops_gouges, job_toolpath
 from pentapod.job.schema.job import Job
-from pentapod.job.withheld import foreseen
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath

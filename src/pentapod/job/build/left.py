@@ -1,4 +1,4 @@
-"""What a job leaves on its region, estimated at points before there is a program: where its ball has not been."""
+"""What a job leaves on its region, estimated at points before there is a program; toolpaths that leave too much."""
 
 from __future__ import annotations
 
@@ -8,11 +8,19 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats
+from pentapod.base.refusal import Refusal
 from pentapod.geometry.polyline import spaced
+from pentapod.job.build.region import rolls
+from pentapod.job.build.toolpath import Reports
+from pentapod.job.schema.job import Job
 from pentapod.mesh.patch import Patch
+from pentapod.toolpath.gouge.report import GougeReport
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify import Cutting
 from pentapod.verify.surface.reachable import nearest_centres
+
+FORBIDDEN = "toolpath"
+"""The stage of the refusal of a toolpath."""
 
 
 @dataclass(frozen=True)
@@ -68,3 +76,49 @@ def missed_by_drops(
     centres = nearest_centres(cutting.surface, at, normals[left], radius, coverage.up, first)
     touching = np.linalg.norm(centres - at, axis=1) <= radius + options.touches  # NaN: no place was found
     return float(touching.sum()) / len(points)
+
+
+@dataclass(frozen=True)
+class ForesightOptions:
+    """When a toolpath is refused since its program would fail its verdict.
+
+    certain: share of the length of cuts that is dropped from which the verdict would find the region missed; missed:
+    estimated share of the region that is missed from which it would. As multiples of the share of it that may be left.
+    """
+
+    certain: float = 50.0
+    missed: float = 2.0
+
+
+def foreseen(
+    job: Job,
+    reports: Reports,
+    toolpath: Toolpath,
+    cutting: Cutting | None,
+    options: ForesightOptions = ForesightOptions(),
+) -> Refusal | None:
+    """Return the refusal of a toolpath that leaves out much of what its ball reaches, as shank or holder would gouge.
+
+    The ball's own places count as reached, so the verdict would find them missed; other cutters may not reach them.
+    """
+    for report in reports.parts:
+        if not isinstance(report, GougeReport) or not rolls(job):
+            continue
+        most, share = job.tolerance.left_share, 100.0 * report.dropped_share
+        cause = (
+            f"with these tool axes shank or holder would cut into the part on {share:.3g} % of the cuts, "
+            "which are left out"
+        )
+        allowed = f"{100.0 * most:.2g} % of the region may be left"
+        if report.dropped_share > options.certain * most:
+            return Refusal(FORBIDDEN, f"{cause}; {allowed}")
+        if not report.dropped or cutting is None or not _is_ball(cutting):
+            continue
+        missed = missed_by_drops(cutting, toolpath, report.dropped_centres)
+        if missed > options.missed * most:
+            return Refusal(FORBIDDEN, f"{cause}: about {100.0 * missed:.2g} % of the region; {allowed}")
+    return None
+
+
+def _is_ball(cutting: Cutting) -> bool:
+    return bool(cutting.cutter) and cutting.cutter[0].is_ball
