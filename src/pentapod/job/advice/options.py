@@ -34,10 +34,9 @@ class AdviceOptions(Value):
     of the largest extent, below which a box keeps it. least: smallest extent of a box, and smallest scale, as shares of
     what is within reach. spare: share of the extent, or of the scale, that is found and taken; the estimate looks at
     few points. smaller: factor on the extent of a second, smaller box. doubtful: width of a part, as a multiple of the
-    work volume's, beyond which its unit is doubted. strategies: that are tried where another makes no toolpath. little:
-    share of the area below which a region is tried after a smaller scale. worth_length: what another tool counts beside
-    a region that keeps a share of the area. other_face_deg: turn of a part on a table from which it lies on another
-    face. steep_deg: slope from which walls get waterlines.
+    work volume's, beyond which its unit is doubted. strategies: that are tried where another makes no toolpath.
+    worth_length: what another tool counts beside a region that keeps a share of the area. other_face_deg: turn of a
+    part on a table from which it lies on another face. steep_deg: slope from which walls get waterlines.
     Where a program fails its verdict: nearer, thinner, slower: factors on the distance between passes, on the cutter's
     diameter (with that distance), and on the feed; surface_points: of the region, at which it is estimated what is
     left; near_share: steps along the toolpath, in radii of the ball; surely: share of what may be left that the
@@ -75,7 +74,6 @@ class AdviceOptions(Value):
     doubtful: float = 5.0
     strategies: tuple[str, ...] = ("raster", "offset")
     worth_length: float = 0.7
-    little: float = 0.02
     other_face_deg: float = 10.0
     nearer: tuple[float, ...] = (0.7, 0.5)
     thinner: float = 0.6

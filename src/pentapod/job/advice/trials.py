@@ -73,26 +73,16 @@ class Trials:
             # More set-ups are for parts that have no place in one: a program that fails in one fails again.
             if base not in self._programmed and not (self.placed and not base.words):
                 yield from self._setups(base)
-        yield from self._less(bases, touching)
-        nearest = touching or settings.nearest
-        if nearest is not None and (short := nearest.found.shortfalls):
-            words = nearest.words or "the job as it is"
-            self.because(f"{words} came nearest: {short[0].constraint} by {short[0].shortfall:.3g} {short[0].unit}")
-
-    def _less(self, bases: list[Setting], touching: Setting | None) -> Iterator[Trial]:
-        """Yield changes that keep less of the part, or make it smaller; hardly any of it comes last."""
-        little: list[Trial] = []
         for base in bases:
-            for trial in self._smaller(base):
-                if trial.kept >= self.options.little:
-                    yield trial
-                else:
-                    little.append(trial)
+            yield from self._smaller(base)
         if touching is not None:
             yield from self._top(touching)
         if bases:
             yield from self._scales(bases[0])
-        yield from little
+        nearest = touching or settings.nearest
+        if nearest is not None and (short := nearest.found.shortfalls):
+            words = nearest.words or "the job as it is"
+            self.because(f"{words} came nearest: {short[0].constraint} by {short[0].shortfall:.3g} {short[0].unit}")
 
     def _keeping_all(self, own: bool) -> Iterator[Trial]:
         """Yield changes of tool axes and placement; the cheapest to plan first, once they fit comfortably."""
