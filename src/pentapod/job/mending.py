@@ -1,8 +1,8 @@
-"""Mending: what a run goes back for, once it is known that a few places of its toolpath cannot be done.
+"""Mending: what a run goes back for, once it is known that its toolpath cannot be done as it is.
 
 Cuts at places where no placement and tool axis keeps the limits, or at which a claim of the verdict fails, are left
 out, and the rest is linked and planned again. Whether what is left there is acceptable is for the verdict to say.
-Where the program is slower than it has to be, its time law is searched for longer.
+Where the program is slower than it has to be, its time law is searched for longer. `other_way` makes another toolpath.
 """
 
 from __future__ import annotations
@@ -17,16 +17,19 @@ from pentapod.base.units import from_si
 from pentapod.base.values import Value
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import marked_runs
+from pentapod.job.advice.settings import TOUCHES
+from pentapod.job.build.other_ways import STANDS, may_come_nearer, may_stand, nearer, nearer_words, standing
 from pentapod.job.build.region import covers_region
 from pentapod.job.outcome import Outcome
 from pentapod.job.schema.job import Job
-from pentapod.job.withheld import STAGE
+from pentapod.job.withheld import STAGE, failures
 from pentapod.machine.machine import Machine
 from pentapod.planning import PlacedPath
 from pentapod.program import Program
 from pentapod.timing import JerkOptions
 from pentapod.toolpath import Toolpath
 from pentapod.toolpath.linking.partition import cutting_intervals
+from pentapod.verify.surface.surface_left import SURFACE_LEFT
 from pentapod.verify.verdict.verdict import Certificate
 
 
@@ -101,6 +104,20 @@ def most_left_out(job: Job, options: MendOptions = OPTIONS) -> float:
     if not covers_region(job) and job.tolerance.si.left is None:
         return 0.0
     return min(options.most * job.tolerance.left_share, options.ever)
+
+
+def other_way(job: Job, outcome: Outcome) -> tuple[Job, str] | None:
+    """Return the job done in another way after a run that failed, and what is said of it; None where none is known."""
+    if outcome.refusal is None:
+        return None
+    failed = failures(outcome.verdict)
+    limits = [each.constraint for each in outcome.refusal.diagnosis]
+    if may_stand(job) and any(name.startswith(TOUCHES) for name in (*limits, *failed)):
+        return standing(job), STANDS
+    if may_come_nearer(job) and outcome.refusal.stage == STAGE and set(failed) == {SURFACE_LEFT}:
+        made = nearer(job)
+        return made, nearer_words(made)
+    return None
 
 
 def mend_of(

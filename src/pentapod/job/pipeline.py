@@ -15,7 +15,6 @@ from pentapod.base.progress import Progress, silent
 from pentapod.job.advice.options import OPTIONS, AdviceOptions, Tried
 from pentapod.job.artefacts import check_folder
 from pentapod.job.build.reach import check_reach
-from pentapod.job.build.upright import may_stand, upright
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.run_folder import staged
 from pentapod.job.schema.job import Job
@@ -62,8 +61,11 @@ def run(
     """
     folder = Path(out)
     check_folder(folder)
-    if before is not None and before.upright and may_stand(job):
-        job = upright(job)
+    if before is not None:
+        # Loads what a part that cannot fit does not need.
+        from pentapod.job.build.other_ways import as_made  # noqa: PLC0415
+
+        job = as_made(job, before.made_from)
     runner = StageRunner(progress)
     with staged(folder) as staging:  # from the start: a second run on the folder fails at once
         used, own_machine = job_machine(job, machine), machine is not None

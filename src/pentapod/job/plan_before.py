@@ -37,6 +37,7 @@ from pentapod.planning.limits.margins import Margins
 from pentapod.planning.plan import PlacementOptions
 from pentapod.planning.problem.weights import NEEDED_MARGIN
 from pentapod.program.csv import read_header
+from pentapod.program.program import Provenance
 from pentapod.timing.reuse import TimeLaws
 from pentapod.timing.time_law.motion_law import MotionLaw
 from pentapod.toolpath.formats import read_toolpath
@@ -63,9 +64,8 @@ _FORMS: dict[str, tuple[str, tuple[int | None, ...]]] = {
 class PlanBefore(Value):
     """A run whose part is found elsewhere. job_file: of the run; placement: workpiece → machine.
 
-    tips, axes (N, 3): of the tool, workpiece frame, axes unit. toolpath: as it was made; job_digest: of the job then.
-    left_out: pairs of waypoints of the job's toolpath between which it makes no cut. upright: whether the tool stands
-    along the view, though the job lets it lean.
+    tips, axes (N, 3): of the tool, workpiece frame, axes unit. toolpath: as it was made.
+    made_from: what the header of its program says.
     """
 
     job_file: Path
@@ -75,9 +75,7 @@ class PlanBefore(Value):
     axes: Floats
     laws: TimeLaws
     toolpath: Toolpath
-    job_digest: str
-    left_out: tuple[tuple[int, int], ...] = ()
-    upright: bool = False
+    made_from: Provenance
 
     @classmethod
     def of(cls, folder: Path) -> PlanBefore:
@@ -107,8 +105,7 @@ class PlanBefore(Value):
         tips, axes = back.apply(to_si(arrays["placed.tips_mm"], "mm")), back.rotate(arrays["placed.axes"])
         job = folder / str(arrays[JOB_FILE])
         made_from, toolpath = read_header(folder / PROGRAM).provenance, read_toolpath(file, "npz")
-        branch, then = Component(w, s), (made_from.job_digest, made_from.left_out, made_from.upright)
-        return cls(job, placement, branch, tips, axes, _laws(arrays), toolpath, *then)
+        return cls(job, placement, Component(w, s), tips, axes, _laws(arrays), toolpath, made_from)
 
     def placed(
         self,

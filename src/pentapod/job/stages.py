@@ -10,7 +10,7 @@ from pathlib import Path
 from pentapod.base.errors import ToolpathError
 from pentapod.base.refusal import Refusal
 from pentapod.job.advice.options import AdviceOptions, Tried
-from pentapod.job.advice.search import TOUCHES, advised
+from pentapod.job.advice.search import advised
 from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, write_arrays, write_json
 from pentapod.job.build.left import FORBIDDEN, foreseen
 from pentapod.job.build.limits import pose_limits, timing_limits
@@ -18,9 +18,8 @@ from pentapod.job.build.pieces import job_part, job_piece, job_without
 from pentapod.job.build.region import covers_region
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import Reports, job_link_style, job_toolpath
-from pentapod.job.build.upright import may_stand, upright
 from pentapod.job.mending import OPTIONS as MENDING
-from pentapod.job.mending import mend_of, most_left_out
+from pentapod.job.mending import mend_of, most_left_out, other_way
 from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
 from pentapod.job.plan_arrays import arrays_of
 from pentapod.job.plan_before import PlanBefore
@@ -44,12 +43,6 @@ from pentapod.verify import Claim, Verdict, judged
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
 
 Writer = Callable[[Outcome, Path], object]
-
-STANDS = (
-    "second attempt: the tool stays upright, and passes end where the part leans over them, because no lean was found "
-    "that keeps the tool clear of the part"
-)
-"""What is said of a job that is done by an upright tool."""
 
 
 def planned(
@@ -76,14 +69,14 @@ def planned(
     )
     if piece is not None:  # the caller plans the other pieces elsewhere
         specification = dataclasses.replace(specification, setups=max(specification.setups, 2))
-    left_out = () if before is None else before.left_out
+    left_out = () if before is None else before.made_from.left_out
     task = Task(job, specification, runner, piece, (*timing_limits(job, machine), *limits), claims, before, left_out)
     outcome = _foreseen(task, staging, writers) or _planned(task, staging, writers)
     alone = piece is None and before is None and job.placement.setups == 1
     if outcome.refusal is not None and alone and covers_region(job):
         outcome = _mended(task, mesh, outcome, staging, writers)
-        if may_stand(job) and _touches(outcome):
-            outcome = _upright(task, mesh, outcome, staging, writers)
+        if not outcome.passed and (other := other_way(job, outcome)) is not None:
+            outcome = _otherwise(task, mesh, outcome, *other, staging, writers)
     refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
     if refusal is not None and refusal.stage == "placement" and splits:
         outcome = _split(task, mesh, refusal, staging, writers)
@@ -219,21 +212,17 @@ def _mended(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Map
     return _written(task, failed.verdict, staging, writers)
 
 
-def _touches(outcome: Outcome) -> bool:
-    """Return whether a run failed since shank or holder touch the part."""
-    limits = () if outcome.refusal is None else [each.constraint for each in outcome.refusal.diagnosis]
-    return any(name.startswith(TOUCHES) for name in (*limits, *failures(outcome.verdict)))
-
-
-def _upright(task: Task, mesh: Mesh, failed: Outcome, staging: Path, writers: Mapping[str, Writer]) -> Outcome:
-    """Go back after a placement at which the tool touches the part, and plan the job with an upright tool.
+def _otherwise(
+    task: Task, mesh: Mesh, failed: Outcome, job: Job, words: str, staging: Path, writers: Mapping[str, Writer]
+) -> Outcome:
+    """Go back after a run that failed, and plan the job as it is done in another way, of which `words` are said.
 
     Returns the failed outcome where that does not pass.
     """
-    job, runner, file = upright(task.job), StageRunner(task.runner.progress), staging / WITHHELD
+    runner, file = StageRunner(task.runner.progress), staging / WITHHELD
     first = file.read_bytes() if file.is_file() else None
     runner.stages += [stage for stage in task.runner.stages if stage.name == "mesh"]
-    runner.stages.append(Stage("upright", 0.0, None, STANDS))
+    runner.stages.append(Stage("another way", 0.0, None, words))
     own_machine = task.specification.sources.machine is None
     make = partial(_toolpath, job, task.machine, mesh, None, runner, None)
     try:

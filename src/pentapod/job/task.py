@@ -12,6 +12,7 @@ from pentapod.base.refusal import Refusal
 from pentapod.base.units import from_si
 from pentapod.base.version import __version__, library_versions, processor_kind
 from pentapod.job.build.limits import placement_limits
+from pentapod.job.build.other_ways import stands, stepover_share
 from pentapod.job.build.placed_check import Ranges, meetings, refusal_of
 from pentapod.job.build.placement import job_weights
 from pentapod.job.build.toolpath import drops_gouges
@@ -227,7 +228,7 @@ class Task:
         source = Provenance(
             machine.name, machine.digest, self.job.digest, __version__, self.piece, *made_on,
             calibration=machine.calibration_name, compensation=GRAVITY if is_compensated(self.job, machine) else "",
-            left_out=self.left_out, upright=self.job.asked is not None,
+            left_out=self.left_out, upright=stands(self.job), stepover_share=stepover_share(self.job),
         )  # fmt: skip
         program = sample(trajectory, self.machine, placed.placement.transform, placed.component, source)
         program = with_process(program, trajectory, self.toolpath)

@@ -50,6 +50,8 @@ LEFT_OUT = "left_out"
 """Key of programs that leave cuts of the toolpath out: pairs of waypoints."""
 UPRIGHT = "upright"
 """Key of programs whose tool stands along the view, though their job lets it lean."""
+STEPOVER_SHARE = "stepover_share"
+"""Key of programs whose passes are nearer together than their job asks: a share of its distance."""
 SWITCHES = "switches"
 """Key of programs that switch spindle, coolant and tool: lists of a row and its words of G-code."""
 LASER_POWER = "laser_power"
@@ -68,6 +70,7 @@ OPTIONAL_KEYS = (
     *SETUP_KEYS,
     LEFT_OUT,
     UPRIGHT,
+    STEPOVER_SHARE,
     SWITCHES,
     LASER_POWER,
     *MADE_ON,
@@ -132,6 +135,8 @@ def header_text(program: Program) -> str:
         values[LEFT_OUT] = pairs_text(source.left_out)
     if source.upright:
         values[UPRIGHT] = "true"
+    if source.stepover_share < 1.0:
+        values[STEPOVER_SHARE] = repr(float(source.stepover_share))
     if program.switches:
         values[SWITCHES] = switches_text(program.switches)
     if program.laser_power is not None:

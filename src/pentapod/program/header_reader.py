@@ -34,6 +34,7 @@ from pentapod.program.header import (
     OPTIONAL_KEYS,
     PROCESS_FORCE,
     SETUP_KEYS,
+    STEPOVER_SHARE,
     SWITCHES,
     UNVERIFIED,
     UPRIGHT,
@@ -46,6 +47,8 @@ from pentapod.toolpath.linking.partition import Piece
 
 LARGEST_COUNT = 2**63 - 1
 MOST_LEGS = 64
+LEAST_SHARE = 0.1
+"""Least distance between passes, as a share of a job's, that a header may state."""
 _LINE = re.compile(r"# ([a-z0-9_]+) = (\S.*)")
 
 
@@ -115,6 +118,7 @@ class _Reader:
                 piece=self._piece(),
                 left_out=self._left_out(),
                 upright=self._true(UPRIGHT),
+                stepover_share=self._stepover_share(),
                 unverified=self.unverified,
                 compensation=self._one_of(COMPENSATION, COMPENSATIONS) if COMPENSATION in self.values else "",
                 **{key: self._text(key) for key in (*MADE_ON, CALIBRATION, COMMANDS) if key in self.values},
@@ -181,6 +185,13 @@ class _Reader:
         if LEFT_OUT not in self.values:
             return ()
         return self._pairs(LEFT_OUT, "waypoints", LARGEST_COUNT)
+
+    def _stepover_share(self) -> float:
+        if STEPOVER_SHARE not in self.values:
+            return 1.0
+        share = number_of(self.values[STEPOVER_SHARE])
+        self._check(STEPOVER_SHARE, LEAST_SHARE <= share < 1.0, f"a share of {LEAST_SHARE:g} to less than 1")
+        return share
 
     def _process_force(self) -> ProcessForce | None:
         if PROCESS_FORCE not in self.values:

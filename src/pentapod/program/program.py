@@ -36,7 +36,8 @@ class Provenance(Value):
     calibration: name of the machine's calibration, "" where there is none. compensation: "gravity" where drives are to
     be told what the legs yield to it, else "". commands: digest of all by which the rows are commands of drives; ""
     where they are readings of the legs. left_out: pairs of waypoints of the job's toolpath between which it makes no
-    cut. upright: whether the tool stands along the view, though the job lets it lean.
+    cut. upright: whether the tool stands along the view, though the job lets it lean. stepover_share: distance between
+    passes, as a share of the job's.
 
     >>> source = Provenance(machine.name, machine.digest, "", "0.1.0")
     """
@@ -54,6 +55,7 @@ class Provenance(Value):
     commands: str = ""
     left_out: tuple[tuple[int, int], ...] = ()
     upright: bool = False
+    stepover_share: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,7 @@ class AdviceOptions(Value):
     strategies: tuple[str, ...] = ("raster", "offset")
     worth_length: float = 0.7
     other_face_deg: float = 10.0
-    nearer: tuple[float, ...] = (0.7, 0.5)
+    nearer: tuple[float, ...] = (0.7, 0.5, 0.3)
     thinner: float = 0.6
     slower: float = 0.6
     surface_points: int = 20_000

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from pentapod.base.errors import InputError, ProgramError
 from pentapod.base.progress import Progress, silent
+from pentapod.job.build.other_ways import as_made
 from pentapod.job.build.process import continued, with_process
 from pentapod.job.build.toolpath import drops_gouges, gouge_options, job_link_style, job_toolpath, judged_tool
-from pentapod.job.build.upright import may_stand, upright
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
@@ -86,9 +86,9 @@ def program_toolpath(
 
 
 def job_of_program(job: Job, program: Path) -> Job:
-    """Return the job as a program file does it: with an upright tool, where its header says so and the job lets it."""
+    """Return the job as a program file does it: in another way, where its header says so and the job lets it."""
     made_from = _provenance(program)
-    return upright(job) if made_from is not None and made_from.upright and may_stand(job) else job
+    return job if made_from is None else as_made(job, made_from)
 
 
 def program_piece(program: Path) -> Piece | None:

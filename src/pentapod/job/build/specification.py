@@ -10,6 +10,7 @@ import numpy as np
 
 from pentapod.base.errors import InputError, MachineError
 from pentapod.base.files import sha256_of
+from pentapod.job.build.other_ways import stands
 from pentapod.job.build.placement import job_constraints
 from pentapod.job.build.region import covers_region, job_region
 from pentapod.job.build.tool import job_tool
@@ -106,7 +107,7 @@ def job_cutting(job: Job, collision_world: CollisionWorld, machine: Machine | No
             mesh = obstacle.surface.mesh
             solids = job_tool(job, machine).solids
             coverage = replace(job_coverage(job, mesh, machine), one_direction=job.axis.mode == "fixed")
-            if job.asked is not None:  # an upright tool where the job lets it lean
+            if stands(job):
                 coverage = replace(coverage, leans=LEANS)
             return Cutting(obstacle.surface, solids, depth, coverage)
     return None

@@ -38,7 +38,7 @@ def replan(
     if not before.job_file.is_file():
         raise InputError("the job file of this run is gone", file=before.job_file, remedy="plan the job again")
     asked = Job.load(before.job_file)
-    if asked.digest != before.job_digest:
+    if asked.digest != before.made_from.job_digest:
         raise InputError(
             "the job, its mesh or its machine has changed since the run", file=before.job_file,
             remedy="plan it with --placement",

@@ -19,9 +19,9 @@ from pentapod.base.values import Value
 from pentapod.geometry.polyline import arc_length
 from pentapod.job.artefacts import PROGRAM
 from pentapod.job.build.limits import pose_limits, timing_limits
+from pentapod.job.build.other_ways import as_made
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import job_link_style
-from pentapod.job.build.upright import may_stand, upright
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.mending import OPTIONS as MENDING
 from pentapod.job.plan_before import PlanBefore
@@ -70,15 +70,17 @@ def restart(job: Job, file: Path, seconds: float, progress: Progress = silent) -
     if file.name != PROGRAM:
         raise InputError("a restart needs the program of a run", file=file, expected=f"DIR/{PROGRAM}")
     before, program = PlanBefore.of(file.parent), read_csv(file)
-    if before.job_digest != job.digest:
+    if before.made_from.job_digest != job.digest:
         remedy = "give the job as it was planned, or plan it again"
-        raise InputError("the program was made from another job", file=file, value=before.job_digest, remedy=remedy)
+        raise InputError(
+            "the program was made from another job", file=file, value=before.made_from.job_digest, remedy=remedy
+        )
     if not 0.0 < seconds < program.duration:
         raise InputError(
             "there is no such time in the program", key="--from", value=f"{seconds:g} s",
             expected=f"more than 0 and less than {program.duration:g} s",
         )  # fmt: skip
-    job = upright(job) if before.upright and may_stand(job) else job
+    job = as_made(job, before.made_from)
     machine, mesh = job_machine(job), job_mesh(job)
     if machine.park.pose is None:
         raise InputError(

@@ -139,7 +139,7 @@ def _timed(
 
 def _way(name: str, trajectory: Trajectory, program: Program, machine: Machine) -> Program:
     """Return the rows of a way, with the program's header; the end where it meets the program is that row itself."""
-    source = replace(program.provenance, piece=None, left_out=(), upright=False)
+    source = replace(program.provenance, piece=None, left_out=(), upright=False, stepover_share=1.0)
     way = sample(trajectory, machine, program.placement, program.component, source)
     end, row = (-1, program.legs[0]) if name == IN else (0, program.legs[-1])
     legs = way.legs.copy()

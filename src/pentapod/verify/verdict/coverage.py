@@ -89,8 +89,13 @@ class Coverage(Value):
         if isinstance(options, WaterlineOptions):
             region = region.steeper(np.asarray(options.upright), options.shallowest)
         if left is None:
-            left = RIDGE_FACTOR * _ridge(options, tool) + options.chordal + path_tolerance
+            left = cls.allowed_left(options, tool, path_tolerance)
         return cls(region, left, share, options.up, whole)
+
+    @staticmethod
+    def allowed_left(options: PathOptions, tool: Tool, path_tolerance: float) -> float:
+        """Return the default of `left` for a strategy with these options, metres."""
+        return RIDGE_FACTOR * _ridge(options, tool) + options.chordal + path_tolerance
 
     @property
     def up(self) -> Floats:

@@ -1,0 +1,99 @@
+"""Other ways to do a job that fails as it is asked for: an upright tool, or passes nearer together.
+
+An upright tool stands along the view everywhere, and passes end where the part leans over them: for parts on which no
+smooth lean keeps the tool clear. What such a tool does not reach is left: the verdict tells how much of it a leaning
+tool might reach. On slopes bull and flat ends leave stairs between passes that are higher than the ridges of a plane,
+by which the bound of what may be left is chosen: passes nearer together keep that bound.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pentapod.base.units import from_si
+from pentapod.cutters.bull_nose import BullNose
+from pentapod.cutters.registry import CUTTERS
+from pentapod.job.build.region import covers_region, rolls
+from pentapod.job.build.tool import job_tool
+from pentapod.job.build.toolpath import job_options
+from pentapod.job.schema.job import Job
+from pentapod.program.program import Provenance
+from pentapod.verify import Coverage
+
+NEARER = 0.5
+"""Distance between passes, as a share of what is asked for, where they come nearer together."""
+
+STANDS = (
+    "second attempt: the tool stays upright, and passes end where the part leans over them, because no lean was found "
+    "that keeps the tool clear of the part"
+)
+"""What is said of a job that is done by an upright tool."""
+
+
+def as_made(job: Job, made_from: Provenance) -> Job:
+    """Return the job as a program does it: in another way, where its header says so and the job lets it."""
+    if made_from.upright and may_stand(job):
+        return standing(job)
+    if made_from.stepover_share < 1.0 and may_come_nearer(job):
+        return nearer(job, made_from.stepover_share)
+    return job
+
+
+def may_stand(job: Job) -> bool:
+    """Return whether an upright tool may do a job: a ball covers a region, and its axis is left to the planner."""
+    return job.axis.mode == "auto" and job.asked is None and covers_region(job) and rolls(job)
+
+
+def standing(job: Job) -> Job:
+    """Return the job with the tool along its view, and no passes under what leans over. Its digest stays."""
+    axis = dict.fromkeys(job.axis.model_fields_set)
+    axis |= {"mode": "fixed", "direction": job.part.region_direction, "tilt_deg": 0.0}
+    made = job.with_(axis=axis, toolpath={"under_mm": 0.0})
+    return replace(made, asked=job, from_file=job.from_file)
+
+
+def stands(job: Job) -> bool:
+    """Return whether a job is one that an upright tool does, though it was asked for with a tool that leans."""
+    return job.asked is not None and job.axis.mode != job.asked.axis.mode
+
+
+def may_come_nearer(job: Job) -> bool:
+    """Return whether passes nearer together may do a job: a bull or flat end covers a region."""
+    return job.asked is None and covers_region(job) and issubclass(CUTTERS[job.tool.type], BullNose)
+
+
+def nearer(job: Job, share: float = NEARER) -> Job:
+    """Return the job with passes nearer together, and the same bound of what may be left. Its digest stays.
+
+    share: of the asked distance between passes.
+    """
+    table = job.toolpath.model_dump(include={"stepover_mm", "scallop_mm"}, exclude_none=True)
+    # The height of a ridge grows with the square of the distance between passes.
+    closer = {key: value * (share if key == "stepover_mm" else share**2) for key, value in table.items()}
+    left = job.tolerance.left_mm or from_si(_allowed_left(job), "mm")
+    made = job.with_(toolpath=closer, tolerance={"left_mm": left})
+    return replace(made, asked=job, from_file=job.from_file)
+
+
+def nearer_words(job: Job) -> str:
+    """Return what is said of a job that passes nearer together do."""
+    return (
+        f"second attempt: passes are {stepover_share(job):.2g} times as far apart as asked, because more than "
+        f"{job.tolerance.left_mm:.3g} mm would be left between them"
+    )
+
+
+def stepover_share(job: Job) -> float:
+    """Return the distance between a job's passes as a share of what was asked for; 1 where it was not changed."""
+    if job.asked is None:
+        return 1.0
+    ours, asked = job.toolpath, job.asked.toolpath
+    distance, height = getattr(asked, "stepover_mm", None), getattr(asked, "scallop_mm", None)
+    if distance is not None:
+        return float(getattr(ours, "stepover_mm", distance)) / distance
+    return 1.0 if height is None else float((getattr(ours, "scallop_mm", height) / height) ** 0.5)
+
+
+def _allowed_left(job: Job) -> float:
+    """Return the height of what a job may leave, metres."""
+    return Coverage.allowed_left(job_options(job), job_tool(job), job.tolerance.si.path)

@@ -1,0 +1,179 @@
+"""A job done by an upright tool or with passes nearer together: what it is, who says so, and who takes it up."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from trimesh.convex import convex_hull
+
+from pentapod.base.errors import ProgramError
+from pentapod.base.refusal import Refusal, Shortfall
+from pentapod.cli.commands.new import dome_stl
+from pentapod.job import Job, judge, run
+from pentapod.job.build.other_ways import may_come_nearer, may_stand, nearer, standing, stands, stepover_share
+from pentapod.job.build.pieces import program_toolpath
+from pentapod.job.build.specification import job_coverage
+from pentapod.job.build.values import job_mesh
+from pentapod.job.task import Task
+from pentapod.program import read_header, write_csv
+from pentapod.toolpath import SegmentKind
+from short_motion import motion
+
+SLOPE = float(np.tan(np.radians(20.0)))
+TABLES = {
+    "part": {"mesh": "part.stl", "unit": "mm"},
+    "machine": {"name": "desk"},
+    "tool": {"type": "ball", "diameter_mm": 6.0},
+    "toolpath": {"stepover_mm": 6.0},
+    "axis": {"mode": "auto", "tilt_deg": 60.0},
+    "feed": {"cut_mm_min": 1500.0},
+    "placement": {"mode": "table", "table_z_mm": 471.0},
+}
+
+
+@pytest.fixture(scope="module")
+def job(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("dome")
+    (folder / "part.stl").write_bytes(dome_stl(cells=8))
+    return Job.from_dict(TABLES, folder)
+
+
+def test_an_upright_job_keeps_the_digest_and_stands_along_the_view(job):
+    made = standing(job)
+    assert made.digest == job.digest
+    assert made.asked is job
+    assert (made.axis.mode, made.axis.direction, made.axis.tilt_deg) == ("fixed", (0.0, 0.0, 1.0), 0.0)
+    assert made.toolpath.under_mm == 0.0
+    assert made.with_(feed={"cut_mm_min": 1500.0}).digest != job.digest
+
+
+def test_an_upright_tool_may_do_jobs_of_balls_whose_axis_is_the_planners(job):
+    assert may_stand(job)
+    assert not may_stand(standing(job))
+    assert not may_stand(job.with_(axis={"mode": "normal"}))
+    assert not may_stand(job.with_(toolpath={"strategy": "edges", "stepover_mm": None}))
+    assert not may_stand(job.with_(tool={"type": "flat"}, axis={"tilt_deg": None}))
+
+
+def test_the_header_says_that_the_tool_is_upright_and_the_toolpath_is_made_so(job, tmp_path):
+    program, _ = motion(0.1)
+    file = write_csv(replace(program, provenance=replace(program.provenance, upright=True)), tmp_path / "a.csv")
+    assert read_header(file).provenance.upright
+    assert np.array_equal(np.unique(program_toolpath(job, job_mesh(job), file).axes, axis=0), [[0.0, 0.0, 1.0]])
+    plain = write_csv(program, tmp_path / "b.csv")
+    assert "upright" not in plain.read_text()
+    assert len(np.unique(program_toolpath(job, job_mesh(job), plain).axes, axis=0)) > 1
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "wrong"),
+    [
+        ("upright", True, "1"),
+        ("stepover_share", 0.5, "true"),
+        ("stepover_share", 0.5, "1.0"),
+        ("stepover_share", 0.5, "0.05"),
+        ("stepover_share", 0.5, "nan"),
+    ],
+)
+def test_a_header_with_another_value_is_refused(key, value, wrong, tmp_path):
+    program, _ = motion(0.1)
+    file = write_csv(replace(program, provenance=replace(program.provenance, **{key: value})), tmp_path / "a.csv")
+    right = "true" if value is True else repr(value)
+    text = file.read_text()
+    assert f"# {key} = {right}\n" in text
+    file.write_text(text.replace(f"# {key} = {right}", f"# {key} = {wrong}"))
+    with pytest.raises(ProgramError, match=key):
+        read_header(file)
+
+
+FLAT = {
+    "tool": {"type": "flat", "diameter_mm": 6.8},
+    "axis": {"mode": "fixed", "direction": [0.0, 0.0, 1.0], "tilt_deg": 0.0},
+}
+
+
+def test_passes_come_nearer_with_the_bound_of_what_was_asked_for(job):
+    flat = job.with_(**FLAT)
+    made = nearer(flat)
+    assert made.digest == flat.digest
+    assert made.asked is flat
+    assert made.toolpath.stepover_mm == 3.0
+    assert stepover_share(made) == 0.5
+    assert not stands(made)
+    assert stands(standing(job))
+    left = [job_coverage(each, job_mesh(each)).left for each in (flat, made)]
+    assert left[0] == pytest.approx(left[1], rel=1e-12)
+    bounded = flat.with_(tolerance={"left_mm": 0.3})
+    assert nearer(bounded).tolerance.left_mm == 0.3
+
+
+def test_ridges_of_a_quarter_of_the_height_are_half_as_far_apart(job):
+    bull = {"tool": {"type": "bull", "diameter_mm": 6.0, "corner_mm": 1.0}, "axis": FLAT["axis"]}
+    made = nearer(job.with_(toolpath={"stepover_mm": None, "scallop_mm": 0.04}, **bull))
+    assert made.toolpath.scallop_mm == pytest.approx(0.01)
+    assert stepover_share(made) == pytest.approx(0.5)
+
+
+def test_passes_come_nearer_for_bull_and_flat_ends_and_once(job):
+    flat = job.with_(**FLAT)
+    assert may_come_nearer(flat)
+    assert not may_come_nearer(nearer(flat))
+    assert not may_come_nearer(job)
+    assert not may_come_nearer(flat.with_(toolpath={"strategy": "edges", "stepover_mm": None}))
+
+
+def test_the_header_says_how_near_the_passes_are_and_the_toolpath_is_made_so(job, tmp_path):
+    flat, program = job.with_(**FLAT), motion(0.1)[0]
+    file = write_csv(replace(program, provenance=replace(program.provenance, stepover_share=0.5)), tmp_path / "a.csv")
+    plain = write_csv(program, tmp_path / "b.csv")
+    assert "stepover_share" not in plain.read_text()
+    near, far = (program_toolpath(flat, job_mesh(flat), each) for each in (file, plain))
+    cuts = [sum(segment.kind is SegmentKind.CUT for segment in path.segments) for path in (near, far)]
+    assert cuts[0] > 1.5 * cuts[1]
+    # A header that says so of a job that does not do it changes nothing.
+    assert len(program_toolpath(job, job_mesh(job), file)) == len(program_toolpath(job, job_mesh(job), plain))
+
+
+@pytest.mark.slow
+def test_where_leaning_makes_the_tool_touch_the_part_it_stays_upright_and_the_output_says_so(
+    job, tmp_path, monkeypatch
+):
+    """The placement with leans is refused, as if the tool touched something there."""
+    real = Task.program
+
+    def once(self, file):
+        if self.job.asked is not None:
+            return real(self, file)
+        refusal = Refusal("placement", "no", (Shortfall("tool body touches the part", ((0, 9000),), 0.2, "mm"),))
+        self.runner.run("placement", lambda: refusal)
+        return refusal
+
+    monkeypatch.setattr(Task, "program", once)
+    done = run(job, tmp_path / "out", advice=None)
+    assert done.passed
+    assert done.job is job
+    assert any("the tool stays upright" in stage.remark for stage in done.stages)
+    assert "\n# upright = true\n" in (tmp_path / "out" / "program.csv").read_text()[:4000]
+    verdict = judge(job, tmp_path / "out")
+    assert {c.claim: c.passed for c in verdict.certificates}["surface left on the region"]
+    assert verdict.passed
+
+
+@pytest.mark.slow
+def test_a_flat_end_on_a_slope_comes_nearer_and_the_output_says_so(tmp_path):
+    """Half a roof of 20°: stairs of 1.13 mm between passes 3.5 mm apart, where 0.64 mm may be left."""
+    corners = [
+        (x, y, z) for x in (0.0, 40.0) for y, z in ((0.0, 0.0), (0.0, 3.0), (24.0, 0.0), (24.0, 3.0 + 24.0 * SLOPE))
+    ]
+    convex_hull(np.array(corners)).export(tmp_path / "part.stl")
+    tables = {**TABLES, "toolpath": {"stepover_mm": 3.5, "direction_deg": 0.0}}
+    job = Job.from_dict({**tables, "tool": FLAT["tool"], "axis": FLAT["axis"]}, tmp_path)
+    done = run(job, tmp_path / "out", advice=None)
+    assert done.passed
+    assert done.job is job
+    assert any("0.5 times as far apart as asked" in stage.remark for stage in done.stages)
+    assert "\n# stepover_share = 0.5\n" in (tmp_path / "out" / "program.csv").read_text()[:4000]
+    verdict = judge(job, tmp_path / "out")
+    left = {c.claim: c for c in verdict.certificates}["surface left on the region"]
+    assert left.passed
+    assert verdict.passed
