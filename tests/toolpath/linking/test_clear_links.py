@@ -97,6 +97,17 @@ def test_a_ball_leaves_a_cut_under_a_ledge_sideways_or_back_on_the_cut():
     assert found.segments[-1] is path.segments[-1]  # the link that is clear stays
 
 
+def test_ways_out_to_places_that_differ_by_rounding_are_joined():
+    """A rapid of no length, on which nothing turns, once asked for 10^15 points."""
+    mesh = boxes(FLOOR, LEDGE)
+    first, second = cut_along((20, 0, 0), (-20, 0, 0)), cut_along((np.nextafter(-20.0, 0.0), 0, 0), (20, 0, 0))
+    both = Toolpath((*first.segments, *second.segments), 3e-3)
+    found, report = without_gouges(both, BALL, mesh, GougeOptions((Remedy.DROP,), links=STYLE))
+    check(found, report, BALL, mesh)
+    assert report.relinked >= 1
+    assert len(found) < 1000
+
+
 def test_a_tool_along_a_wall_leaves_it_without_a_rapid_that_touches():
     mesh = boxes(FLOOR, ((2.98, -40, 0), (40, 40, 30)))  # the cut may be 50 µm deep, a rapid not at all
     path = cut_along((0, -20, 0), (0, 20, 0))

@@ -130,9 +130,9 @@ class _Search:
         corners = np.stack([up[0], *over, down[0]])
         length = float(np.linalg.norm(np.diff(np.stack(over), axis=0), axis=1).sum())
         path = blended(corners, style)
-        # Midway the axis turns 15/8 times as fast as on average.
-        step = length * style.axis_step / max(1.875 * turn, style.axis_step)
-        tips = spaced(path, min(style.rapid_spacing, step) if length > 0.0 else style.rapid_spacing)
+        # Midway the axis turns 15/8 times as fast as on average. Where it does not turn, the length may be next to none.
+        turns = 1.875 * turn / style.axis_step
+        tips = spaced(path, min(style.rapid_spacing, length / turns) if turns > 1.0 else style.rapid_spacing)
         along = arc_length(tips)
         rises = [float(np.linalg.norm(way[1] - way[0])) for way in (up, down)]
         share = (along - rises[0]) / max(along[-1] - sum(rises), 1e-12)

@@ -90,8 +90,24 @@ class TipSurface(RolledSurface):
                 for k in range(3):
                     contacts = self._touched(patch)
                     patch, _ = patch.above(side * (contacts[:, k] - bound[k]), 0.0)
-        patch = patch.where_normals(partial(region.faces, default=0.5 * np.pi))
+        patch = self._facing(patch, region)
         return patch if self.part.topology.watertight else patch.above(-self._beyond_border(patch), 0.0)[0]
+
+    def _facing(self, patch: Patch, region: Region) -> Patch:
+        """Return the part that faces a region, with whole walls.
+
+        At the foot of a wall that leans to the axis, the surface bends to go on along the axis. The mean normal there
+        is out of the region, and the region would end up to a facet above the foot.
+        """
+        faces = partial(region.faces, default=0.5 * np.pi)
+        across, own = patch.facet_normals @ region.direction, faces(patch.facet_normals)
+        walls = patch.faces[(own >= 0.0) & (across < self.options.upright_wall)]
+        values = np.empty(len(patch.vertices))
+        values[patch.faces.ravel()] = faces(patch.normals).ravel()
+        if not (values[walls] < 0.0).any():
+            return patch.where_normals(faces)
+        values[walls] = np.maximum(values[walls], self.options.foot)
+        return patch.above(values, 0.0)[0]
 
     @property
     def _lowest(self) -> float:
@@ -99,9 +115,18 @@ class TipSurface(RolledSurface):
         return float((self.part.vertices @ self.tips.axis).min()) - self.options.on_level * self.radius
 
     def feet(self, patch: Patch) -> Bools:
-        """Return which edges (E,) of a patch are the lowest of walls: the end cuts above its tip alone."""
-        low = patch.vertices @ self.tips.axis < self._lowest + self.options.on_level * self.radius
-        return low[patch.topology.edges].all(axis=1) & (patch.topology.facets_at_edge == 1)
+        """Return which edges (E,) of a patch are the lowest of steep faces: the end cuts above its tip alone."""
+        topology, axis, heights = patch.topology, self.tips.axis, patch.vertices @ self.tips.axis
+        low = heights < self._lowest + self.options.on_level * self.radius
+        lowest = low[topology.edges].all(axis=1)
+        # A steep face rises from its foot.
+        ends = heights[topology.edges].mean(axis=1)[topology.edge_of_side].reshape(-1, 3)
+        rises = heights[patch.faces].mean(axis=1)[:, None] - ends
+        sides = np.linalg.norm(patch.vertices[np.roll(patch.faces, -1, axis=1)] - patch.vertices[patch.faces], axis=2)
+        steep = patch.facet_normals @ axis < np.cos(self.options.steep)
+        foot = steep[:, None] & (rises * sides > self.options.rising * patch.areas[:, None])
+        lowest[topology.edge_of_side.reshape(-1, 3)[foot]] = True
+        return np.asarray(lowest & (topology.facets_at_edge == 1))
 
     def waypoints(self, passes: Passes, options: PathOptions) -> Passes:
         """Return tips for lines on the surface, put exactly on it, and the axis."""
