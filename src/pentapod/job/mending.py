@@ -18,7 +18,16 @@ from pentapod.base.values import Value
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import marked_runs
 from pentapod.job.advice.settings import TOUCHES
-from pentapod.job.build.other_ways import STANDS, may_come_nearer, may_stand, nearer, nearer_words, standing
+from pentapod.job.build.other_ways import (
+    STANDS,
+    STANDS_ON_END,
+    ends,
+    may_come_nearer,
+    may_stand,
+    nearer,
+    nearer_words,
+    standing,
+)
 from pentapod.job.build.region import covers_region
 from pentapod.job.outcome import Outcome
 from pentapod.job.schema.job import Job
@@ -112,8 +121,9 @@ def other_way(job: Job, outcome: Outcome) -> tuple[Job, str] | None:
         return None
     failed = failures(outcome.verdict)
     limits = [each.constraint for each in outcome.refusal.diagnosis]
-    if may_stand(job) and any(name.startswith(TOUCHES) for name in (*limits, *failed)):
-        return standing(job), STANDS
+    touches = any(name.startswith(TOUCHES) for name in (*limits, *failed))
+    if may_stand(job) and (touches or ends(job)):
+        return standing(job), STANDS_ON_END if ends(job) else STANDS
     if may_come_nearer(job) and outcome.refusal.stage == STAGE and set(failed) == {SURFACE_LEFT}:
         made = nearer(job)
         return made, nearer_words(made)

@@ -44,6 +44,9 @@ from pentapod.verify.surface.surface_left import SURFACE_LEFT
 
 Writer = Callable[[Outcome, Path], object]
 
+ANOTHER_WAY = "another way"
+"""Name of the stage that says in which other way a job is done."""
+
 
 def planned(
     job: Job,
@@ -221,8 +224,8 @@ def _otherwise(
     """
     runner, file = StageRunner(task.runner.progress), staging / WITHHELD
     first = file.read_bytes() if file.is_file() else None
-    runner.stages += [stage for stage in task.runner.stages if stage.name == "mesh"]
-    runner.stages.append(Stage("another way", 0.0, None, words))
+    runner.stages += [stage for stage in task.runner.stages if stage.name in ("mesh", ANOTHER_WAY)]
+    runner.stages.append(Stage(ANOTHER_WAY, 0.0, None, words))
     own_machine = task.specification.sources.machine is None
     make = partial(_toolpath, job, task.machine, mesh, None, runner, None)
     try:
@@ -234,6 +237,11 @@ def _otherwise(
     outcome = _planned(again, staging, writers)
     if not outcome.passed:
         outcome = _mended(again, mesh, outcome, staging, writers)
+    if not outcome.passed and (other := other_way(job, outcome)) is not None:
+        outcome = _otherwise(again, mesh, outcome, *other, staging, writers)
+        if outcome.passed:
+            task.runner.stages = runner.stages
+            return outcome
     if outcome.passed:
         left = next(each.method for each in outcome.verdict.certificates if each.claim == SURFACE_LEFT)
         runner.stages.append(Stage("left", 0.0, None, f"{SURFACE_LEFT}: {left.rsplit('; ', 1)[-1]}"))

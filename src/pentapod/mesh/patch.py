@@ -167,7 +167,7 @@ class Patch:
             for axis in range(3):
                 for bound, side in zip(region.bounds[:, axis], (1.0, -1.0), strict=True):
                     values = (side * (patch.vertices[:, axis] - float(bound)))[patch.faces]
-                    patch = patch._trimmed(values, linear_root(values))
+                    patch = patch.trimmed(values, linear_root(values))
         return patch
 
     def only(self, facets: Bools) -> Patch:
@@ -176,10 +176,10 @@ class Patch:
 
     def where_normals(self, quantity: Callable[[Floats], Floats]) -> Patch:
         """Return the part where a quantity of the normal, (..., 3) to (...), is not negative."""
-        return self._trimmed(quantity(self.normals), normal_root(quantity, self.normals))
+        return self.trimmed(quantity(self.normals), normal_root(quantity, self.normals))
 
-    def _trimmed(self, values: Floats, root: Root) -> Patch:
-        """Return the part where values (F, 3) are not negative."""
+    def trimmed(self, values: Floats, root: Root) -> Patch:
+        """Return the part where values (F, 3) at the corners of facets are not negative; root: where they are zero."""
         if (values >= 0.0).all():
             return self
         return Patch(*trimmed(self.vertices, self.faces, self.normals, values, root))

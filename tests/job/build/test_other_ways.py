@@ -6,15 +6,27 @@ import numpy as np
 import pytest
 from trimesh.convex import convex_hull
 
+import concave_parts
 from pentapod.base.errors import ProgramError
 from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.cli.commands.new import dome_stl
 from pentapod.job import Job, judge, run
-from pentapod.job.build.other_ways import may_come_nearer, may_stand, nearer, standing, stands, stepover_share
+from pentapod.job.build.other_ways import (
+    as_made,
+    may_come_nearer,
+    may_stand,
+    nearer,
+    nearer_words,
+    standing,
+    stands,
+    stepover_share,
+)
 from pentapod.job.build.pieces import program_toolpath
+from pentapod.job.build.region import rolls
 from pentapod.job.build.specification import job_coverage
 from pentapod.job.build.values import job_mesh
 from pentapod.job.task import Task
+from pentapod.mesh.io.stl import write_stl
 from pentapod.program import read_header, write_csv
 from pentapod.toolpath import SegmentKind
 from short_motion import motion
@@ -47,12 +59,32 @@ def test_an_upright_job_keeps_the_digest_and_stands_along_the_view(job):
     assert made.with_(feed={"cut_mm_min": 1500.0}).digest != job.digest
 
 
-def test_an_upright_tool_may_do_jobs_of_balls_whose_axis_is_the_planners(job):
+def test_an_upright_tool_may_do_jobs_whose_axis_is_the_planners(job):
     assert may_stand(job)
     assert not may_stand(standing(job))
     assert not may_stand(job.with_(axis={"mode": "normal"}))
     assert not may_stand(job.with_(toolpath={"strategy": "edges", "stepover_mm": None}))
-    assert not may_stand(job.with_(tool={"type": "flat"}, axis={"tilt_deg": None}))
+    beam = {"type": "standoff", "standoff_mm": 40.0, "diameter_mm": None}
+    assert not may_stand(job.with_(tool=beam, axis={"tilt_deg": None}))
+    flat = job.with_(tool={"type": "flat"}, axis={"tilt_deg": None})
+    assert may_stand(flat)
+    made = standing(flat)
+    assert (made.axis.mode, made.toolpath.under_mm) == ("fixed", None)
+    assert rolls(made)
+    assert not rolls(flat)
+
+
+def test_both_ways_together_are_told_apart_from_what_was_asked_for(job):
+    flat = job.with_(tool={"type": "flat"}, axis={"tilt_deg": None})
+    made = nearer(standing(flat))
+    assert made.asked is flat
+    assert made.digest == flat.digest
+    assert (stands(made), stepover_share(made)) == (True, 0.5)
+    assert "third attempt" in nearer_words(made)
+    assert not may_stand(made)
+    assert not may_come_nearer(made)
+    header = replace(motion(0.1)[0].provenance, upright=True, stepover_share=0.5)
+    assert as_made(flat, header).tables == made.tables
 
 
 def test_the_header_says_that_the_tool_is_upright_and_the_toolpath_is_made_so(job, tmp_path):
@@ -157,6 +189,22 @@ def test_where_leaning_makes_the_tool_touch_the_part_it_stays_upright_and_the_ou
     verdict = judge(job, tmp_path / "out")
     assert {c.claim: c.passed for c in verdict.certificates}["surface left on the region"]
     assert verdict.passed
+
+
+@pytest.mark.slow
+def test_a_bull_end_whose_axis_is_the_planners_machines_ribs_upright(tmp_path):
+    """Along the normals of the ribs the end would cut into their neighbours: much would be left."""
+    mesh = concave_parts.mesh("ribs")
+    scale = 45.0 / np.ptp(mesh.bounds, axis=0).max()
+    (tmp_path / "part.stl").write_bytes(write_stl(scale * mesh.vertices[mesh.faces], "ribs"))
+    tool = {"type": "bull", "diameter_mm": 5.7, "corner_mm": 1.4}
+    toolpath = {"strategy": "offset", "stepover_mm": 3.4}
+    job = Job.from_dict({**TABLES, "tool": tool, "toolpath": toolpath, "axis": {"mode": "auto"}}, tmp_path)
+    done = run(job, tmp_path / "out", advice=None)
+    assert done.passed
+    assert any("the tool keeps one direction" in stage.remark for stage in done.stages)
+    assert read_header(tmp_path / "out" / "program.csv").provenance.upright
+    assert judge(job, tmp_path / "out").passed
 
 
 @pytest.mark.slow

@@ -75,7 +75,7 @@ def ridges(kind, mesh, toolpath, count):
     return low
 
 
-FEW, MANY = 6_000, 20_000  # of few points chance can put more than 0.1 % where an offset's fronts turn a corner
+FEW, MANY = 12_000, 20_000  # of few points chance can put more than 0.1 % where an offset's fronts turn a corner
 QUICK = {("torus", RasterOptions), ("cylinder", RasterOptions)}
 
 

@@ -268,3 +268,15 @@ def test_a_part_in_use_has_one_drive_surface_however_far_passes_go_under(pocket)
     again = DriveSurface.of(pocket.part, R, UP, DriveOptions().leaning(1.0))
     assert again.mesh is pocket.mesh
     assert DriveSurface.of(pocket.part, R, UP, replace(DriveOptions(), step=0.5)).mesh is not pocket.mesh
+
+
+@pytest.mark.parametrize("radius", [2.25e-3, 3e-3, 4.1e-3])
+def test_a_region_of_walls_ends_at_their_very_feet(radius):
+    """It ended up to a facet above them, a quarter of the radius, and the lowest ring left material there."""
+    block = DriveSurface.of(part(trimesh.creation.box(bounds=[(0.0, 0.0, 0.0), (0.04, 0.03, 0.02)])), radius, UP)
+    patch = block.patch(Region(angle=0.5 * np.pi))
+    border = patch.vertices[patch.topology.edges[patch.topology.facets_at_edge == 1]].reshape(-1, 3)
+    assert len(border) > 100
+    # A right angle has a slack of half a degree.
+    assert -0.01 * radius < border[:, 2].min()
+    assert border[:, 2].max() < 1e-3 * radius

@@ -1,9 +1,11 @@
 """Other ways to do a job that fails as it is asked for: an upright tool, or passes nearer together.
 
 An upright tool stands along the view everywhere, and passes end where the part leans over them: for parts on which no
-smooth lean keeps the tool clear. What such a tool does not reach is left: the verdict tells how much of it a leaning
-tool might reach. On slopes bull and flat ends leave stairs between passes that are higher than the ridges of a plane,
-by which the bound of what may be left is chosen: passes nearer together keep that bound.
+smooth lean keeps a ball clear, and for concave ones, where bull and flat ends cannot stand along the normals. What such
+a tool does not reach is left: the verdict tells how much of it a leaning tool might reach.
+
+On slopes bull and flat ends leave stairs between passes that are higher than the ridges of a plane, by which the bound
+of what may be left is chosen: passes nearer together keep that bound.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from pentapod.job.build.tool import job_tool
 from pentapod.job.build.toolpath import job_options
 from pentapod.job.schema.job import Job
 from pentapod.program.program import Provenance
+from pentapod.toolpath.strategies.registry import STRATEGIES
 from pentapod.verify import Coverage
 
 NEARER = 0.5
@@ -27,29 +30,37 @@ STANDS = (
     "second attempt: the tool stays upright, and passes end where the part leans over them, because no lean was found "
     "that keeps the tool clear of the part"
 )
-"""What is said of a job that is done by an upright tool."""
+"""What is said of a job that an upright ball does."""
+
+STANDS_ON_END = (
+    "second attempt: the tool keeps one direction, that of the region, because the job cannot be done with its axes "
+    "along the normals of the surface"
+)
+"""What is said of a job that an upright bull or flat end does."""
 
 
 def as_made(job: Job, made_from: Provenance) -> Job:
     """Return the job as a program does it: in another way, where its header says so and the job lets it."""
     if made_from.upright and may_stand(job):
-        return standing(job)
+        job = standing(job)
     if made_from.stepover_share < 1.0 and may_come_nearer(job):
-        return nearer(job, made_from.stepover_share)
+        job = nearer(job, made_from.stepover_share)
     return job
 
 
 def may_stand(job: Job) -> bool:
-    """Return whether an upright tool may do a job: a ball covers a region, and its axis is left to the planner."""
-    return job.axis.mode == "auto" and job.asked is None and covers_region(job) and rolls(job)
+    """Return whether an upright tool may do a job: it covers a region, and its axis is left to the planner."""
+    if job.axis.mode != "auto" or not covers_region(job):
+        return False
+    return rolls(job) or (ends(job) and STRATEGIES[job.toolpath.strategy].options.rolls)
 
 
 def standing(job: Job) -> Job:
     """Return the job with the tool along its view, and no passes under what leans over. Its digest stays."""
     axis = dict.fromkeys(job.axis.model_fields_set)
     axis |= {"mode": "fixed", "direction": job.part.region_direction, "tilt_deg": 0.0}
-    made = job.with_(axis=axis, toolpath={"under_mm": 0.0})
-    return replace(made, asked=job, from_file=job.from_file)
+    made = job.with_(axis=axis, **({} if ends(job) else {"toolpath": {"under_mm": 0.0}}))
+    return replace(made, asked=job.asked or job, from_file=job.from_file)
 
 
 def stands(job: Job) -> bool:
@@ -59,7 +70,12 @@ def stands(job: Job) -> bool:
 
 def may_come_nearer(job: Job) -> bool:
     """Return whether passes nearer together may do a job: a bull or flat end covers a region."""
-    return job.asked is None and covers_region(job) and issubclass(CUTTERS[job.tool.type], BullNose)
+    return stepover_share(job) == 1.0 and covers_region(job) and ends(job)
+
+
+def ends(job: Job) -> bool:
+    """Return whether a job's tool is a bull or flat end."""
+    return issubclass(CUTTERS[job.tool.type], BullNose)
 
 
 def nearer(job: Job, share: float = NEARER) -> Job:
@@ -72,15 +88,14 @@ def nearer(job: Job, share: float = NEARER) -> Job:
     closer = {key: value * (share if key == "stepover_mm" else share**2) for key, value in table.items()}
     left = job.tolerance.left_mm or from_si(_allowed_left(job), "mm")
     made = job.with_(toolpath=closer, tolerance={"left_mm": left})
-    return replace(made, asked=job, from_file=job.from_file)
+    return replace(made, asked=job.asked or job, from_file=job.from_file)
 
 
 def nearer_words(job: Job) -> str:
     """Return what is said of a job that passes nearer together do."""
-    return (
-        f"second attempt: passes are {stepover_share(job):.2g} times as far apart as asked, because more than "
-        f"{job.tolerance.left_mm:.3g} mm would be left between them"
-    )
+    number, left = "third" if stands(job) else "second", f"{job.tolerance.left_mm:.3g} mm"
+    passes = f"passes are {stepover_share(job):.2g} times as far apart as asked"
+    return f"{number} attempt: {passes}, because more than {left} would be left between them"
 
 
 def stepover_share(job: Job) -> float:

@@ -72,7 +72,7 @@ def crease_lines(
 def joined_ends(lines: list[Line], longest: float, corner: float, same: float = 0.0) -> list[Line]:
     """Return lines, points and normals (n, 3), joined end to end where they go on within `longest` metres.
 
-    The nearest ends first. Neither line turns by more than `corner` radians against the other, or against the way
+    The nearest ends first, of those that are one point the straightest. Neither line turns by more than `corner` radians against the other, or against the way
     between them; ends within `same` metres become one.
     """
     if len(lines) < 2:
@@ -87,10 +87,11 @@ def joined_ends(lines: list[Line], longest: float, corner: float, same: float = 
     length = np.linalg.norm(way, axis=1)
     on = length > same
     least = np.cos(corner)
-    suits = -(out[a] * out[b]).sum(axis=1) > least
+    straight = -(out[a] * out[b]).sum(axis=1)
+    suits = straight > least
     suits &= ~on | ((out[a] * way).sum(axis=1) > least * length) & (-(out[b] * way).sum(axis=1) > least * length)
     other = np.full(len(ends), -1, dtype=np.intp)
-    for k in np.lexsort((b, a, length)).tolist():
+    for k in np.lexsort((b, a, -straight, np.where(on, length, 0.0))).tolist():
         if suits[k] and other[a[k]] < 0 and other[b[k]] < 0:
             other[a[k]], other[b[k]] = b[k], a[k]
     done = np.zeros(len(lines), dtype=np.bool_)

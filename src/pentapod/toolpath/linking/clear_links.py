@@ -130,7 +130,7 @@ class _Search:
         corners = np.stack([up[0], *over, down[0]])
         length = float(np.linalg.norm(np.diff(np.stack(over), axis=0), axis=1).sum())
         path = blended(corners, style)
-        # Midway the axis turns 15/8 times as fast as on average. Where it does not turn, the length may be next to none.
+        # Midway the axis turns 15/8 times as fast as on average. Without a turn the length may be next to none.
         turns = 1.875 * turn / style.axis_step
         tips = spaced(path, min(style.rapid_spacing, length / turns) if turns > 1.0 else style.rapid_spacing)
         along = arc_length(tips)

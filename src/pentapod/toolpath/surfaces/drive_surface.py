@@ -9,7 +9,6 @@ part. A ball is clear at a centre whatever its axis, so nothing of this depends 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -114,24 +113,12 @@ class DriveSurface(RolledSurface):
                 for axis in range(3):
                     contacts = self.contacts(patch.vertices)
                     patch, _ = patch.above(side * (contacts[:, axis] - bound[axis]), 0.0)
-        patch = self._with_exact_normals(patch, region).where_normals(partial(region.faces, default=0.5 * np.pi))
+        patch = self._facing(patch, region)
         return patch if self.part.topology.watertight else patch.above(-self._beyond_border(patch), 0.0)[0]
 
-    def _with_exact_normals(self, patch: Patch, region: Region) -> Patch:
-        """Return the patch with the exact normals of the surface where the region may end, but for creases.
-
-        The mean of the facets about the foot of a wall leans, and the region would end up to a facet above the foot.
-        """
-        faces, options = region.faces(patch.normals, 0.5 * np.pi), self.options
-        near = np.zeros(len(patch.vertices), dtype=np.bool_)
-        near[patch.faces[np.abs(faces) < options.region_ends]] = True
-        if not near.any():
-            return patch
-        away = np.zeros_like(patch.vertices)
-        away[near] = self.centres.tree.closest(patch.vertices[near])[1]
-        exact = (away / np.maximum(np.linalg.norm(away, axis=1), 1e-300)[:, None])[patch.faces]
-        smooth = np.einsum("fki,fki->fk", exact, patch.normals) > np.cos(options.crease)
-        return replace(patch, normals=np.where(smooth[:, :, None], exact, patch.normals))
+    def _normals(self, points: Floats) -> Floats:
+        away = self.centres.tree.closest(points)[1]
+        return away / np.maximum(np.linalg.norm(away, axis=1), 1e-300)[:, None]
 
     def waypoints(self, passes: Passes, options: PathOptions) -> Passes:
         """Return contacts and unit normals for lines on the drive surface, their centres put exactly on the offset.

@@ -31,13 +31,14 @@ class DriveOptions(Value):
     as shares of the radius: walls, and valleys between steep flanks, do not hide themselves, nor do walls that lean
     under by less. under: the same as `sideways` for links, which may lead a little farther; upright: and for those
     between ends over which nothing leans. evened: how often the stepover for a scallop is averaged with that of
-    neighbouring facets, whose curvature is noisy. region_ends: cosines of normals by which a vertex may be off a
-    region's limit there; crease: angle between exact and mean normals, radians, from which they are two. upright_wall:
-    cosine to a region's direction below which a facet is one of a wall; foot: cosine by which the foot of one is within
-    the region. steep: angle to the axis, radians, from which a face has a foot; rising: least rise of a facet over it, as
-    a share of its height over that side. about: how far beyond what the ball touches in a region's
-    box the surface is made, as a multiple of the radius: links may lead there. reach, aside: how far a place of the tip
-    is moved onto its surface from near it, and sideways on a link, as shares of the radius.
+    neighbouring facets, whose curvature is noisy. about: how far beyond what the ball touches in a region's box the
+    surface is made, as a multiple of the radius: links may lead there. region_ends: cosines by which a normal is off
+    the limit of a region where that may end; crease: angle between exact and mean normals, radians, from which
+    there are two; halvings: of an edge, to find where the region ends on it. wall: cosine to a region's direction
+    below which a facet is one of a wall; foot: cosine by which the foot of one is within the region. steep: angle to
+    the axis, radians, from which a face has a foot; rising: least rise of a facet over it, as a share of its height.
+    reach, aside: how far a place of the tip is moved onto its surface from near it, and sideways on a link, as shares
+    of the radius.
     """
 
     step: float = 0.25
@@ -60,7 +61,8 @@ class DriveOptions(Value):
     evened: int = 2
     region_ends: float = 0.5
     crease: float = 0.35
-    upright_wall: float = 0.1
+    halvings: int = 12
+    wall: float = 0.1
     foot: float = 1e-3
     steep: float = 0.25 * np.pi
     rising: float = 0.5

@@ -11,7 +11,7 @@ from functools import cached_property, partial
 import numpy as np
 from scipy.spatial import KDTree
 
-from pentapod.base.arrays import Bools, Floats
+from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import turned
 from pentapod.geometry.polyline import arc_length
 from pentapod.mesh.mesh import Mesh
@@ -73,6 +73,15 @@ class RolledSurface(ABC):
     def _seen(self, ways: list[Floats | None], slack: float) -> list[Floats | None]:
         """Return ways (n, 3) of the cutter, None for those on which the part lies above."""
 
+    @abstractmethod
+    def _normals(self, points: Floats) -> Floats:
+        """Return the unit normals (N, 3) of the surface at points near it, NaN where they are not known."""
+
+    def _whole(self, patch: Patch, region: Region) -> Ints:
+        """Return vertices of a patch that face a region whatever their normals: none for a ball."""
+        del patch, region
+        return np.zeros(0, dtype=np.intp)
+
     def feet(self, patch: Patch) -> Bools:
         """Return which edges (E,) of a patch are borders along which a pass must run: none for a ball."""
         return np.zeros(len(patch.topology.edges), dtype=np.bool_)
@@ -107,6 +116,38 @@ class RolledSurface(ABC):
     def _patches(self) -> dict[int, tuple[Region, Patch]]:
         """Patches that are known: strategies, fills and links ask for the same one. Regions are kept for their ids."""
         return {}
+
+    def _facing(self, patch: Patch, region: Region) -> Patch:
+        """Return the part of a patch that faces a region.
+
+        Its border is found by the normals of the surface itself. The mean of those of the facets about the foot of a
+        wall leans, and the region would end up to a facet above the foot. At creases the means count.
+        """
+        faces, options = partial(region.faces, default=0.5 * np.pi), self.options
+        means = np.zeros_like(patch.vertices)
+        means[patch.faces.ravel()] = patch.normals.reshape(-1, 3)
+        values = faces(means)
+        near = np.flatnonzero(np.abs(values) < options.region_ends)
+        exact = self._normals(patch.vertices[near])
+        smooth = np.einsum("vi,vi->v", exact, means[near]) > np.cos(options.crease)
+        values[near[smooth]] = faces(exact[smooth])
+        whole = self._whole(patch, region)
+        values[whole] = np.maximum(values[whole], options.foot)
+
+        def root(facet: Ints, a: Ints, b: Ints) -> Floats:
+            first, last = patch.faces[facet, a], patch.faces[facet, b]
+            low, high, inside = np.zeros(len(first)), np.ones(len(first)), values[first] >= 0.0
+            for _ in range(options.halvings):
+                middle = 0.5 * (low + high)
+                share = middle[:, None]
+                normals = self._normals((1.0 - share) * patch.vertices[first] + share * patch.vertices[last])
+                unknown = np.isnan(normals[:, 0])
+                between = (1.0 - share) * means[first] + share * means[last]
+                same = (faces(np.where(unknown[:, None], between, normals)) >= 0.0) == inside
+                low, high = np.where(same, middle, low), np.where(same, high, middle)
+            return np.where(inside, low, high)
+
+        return patch.trimmed(values[patch.faces], root)
 
     def steps(self, patch: Patch, across: Floats, options: CoverOptions) -> Floats:
         """Return the stepover (F,) on each facet, along the drive surface. Raises ToolpathError as `surface_steps`."""

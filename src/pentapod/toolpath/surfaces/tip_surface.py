@@ -7,12 +7,11 @@ for the normal there: with the fixed axis each cutter's tip is then where it sho
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats
+from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.cutters.bull_nose import BullNose
 from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.mesh import Mesh
@@ -93,21 +92,21 @@ class TipSurface(RolledSurface):
         patch = self._facing(patch, region)
         return patch if self.part.topology.watertight else patch.above(-self._beyond_border(patch), 0.0)[0]
 
-    def _facing(self, patch: Patch, region: Region) -> Patch:
-        """Return the part that faces a region, with whole walls.
+    def _normals(self, points: Floats) -> Floats:
+        local, options = points @ self.tips.frame.T, self.options
+        heights, normals = self.tips.lowered.heights(local[:, :2])
+        walls = ~(np.abs(local[:, 2] - heights) < options.border * self.radius)
+        return np.where(walls[:, None], np.nan, normals @ self.tips.frame)
 
-        At the foot of a wall that leans to the axis, the surface bends to go on along the axis. The mean normal there
-        is out of the region, and the region would end up to a facet above the foot.
+    def _whole(self, patch: Patch, region: Region) -> Ints:
+        """Return the vertices of walls that face a region.
+
+        At the foot of one that leans to the axis, the surface bends to go on along the axis. The mean normal there is
+        out of the region.
         """
-        faces = partial(region.faces, default=0.5 * np.pi)
-        across, own = patch.facet_normals @ region.direction, faces(patch.facet_normals)
-        walls = patch.faces[(own >= 0.0) & (across < self.options.upright_wall)]
-        values = np.empty(len(patch.vertices))
-        values[patch.faces.ravel()] = faces(patch.normals).ravel()
-        if not (values[walls] < 0.0).any():
-            return patch.where_normals(faces)
-        values[walls] = np.maximum(values[walls], self.options.foot)
-        return patch.above(values, 0.0)[0]
+        normals = patch.facet_normals
+        own = region.faces(normals, 0.5 * np.pi) >= 0.0
+        return patch.faces[own & (normals @ region.direction < self.options.wall)].ravel()
 
     @property
     def _lowest(self) -> float:
