@@ -72,8 +72,8 @@ def crease_lines(
 def joined_ends(lines: list[Line], longest: float, corner: float, same: float = 0.0) -> list[Line]:
     """Return lines, points and normals (n, 3), joined end to end where they go on within `longest` metres.
 
-    The nearest ends first, of those that are one point the straightest. Neither line turns by more than `corner` radians against the other, or against the way
-    between them; ends within `same` metres become one.
+    The nearest ends first, of those that are one point the straightest. Neither line turns by more than `corner`
+    radians against the other, or against the way between them; ends within `same` metres become one.
     """
     if len(lines) < 2:
         return lines

@@ -117,15 +117,16 @@ class TipSurface(RolledSurface):
         """Return which edges (E,) of a patch are the lowest of steep faces: the end cuts above its tip alone."""
         topology, axis, heights = patch.topology, self.tips.axis, patch.vertices @ self.tips.axis
         low = heights < self._lowest + self.options.on_level * self.radius
-        lowest = low[topology.edges].all(axis=1)
+        lowest = np.flatnonzero(low[topology.edges].all(axis=1))
         # A steep face rises from its foot.
-        ends = heights[topology.edges].mean(axis=1)[topology.edge_of_side].reshape(-1, 3)
+        ends = heights[topology.edges].mean(axis=1)[topology.edge_of_side]
         rises = heights[patch.faces].mean(axis=1)[:, None] - ends
         sides = np.linalg.norm(patch.vertices[np.roll(patch.faces, -1, axis=1)] - patch.vertices[patch.faces], axis=2)
         steep = patch.facet_normals @ axis < np.cos(self.options.steep)
         foot = steep[:, None] & (rises * sides > self.options.rising * patch.areas[:, None])
-        lowest[topology.edge_of_side.reshape(-1, 3)[foot]] = True
-        return np.asarray(lowest & (topology.facets_at_edge == 1))
+        feet = np.zeros(len(topology.edges), dtype=np.bool_)
+        feet[lowest] = feet[topology.edge_of_side[foot]] = True
+        return feet & (topology.facets_at_edge == 1)
 
     def waypoints(self, passes: Passes, options: PathOptions) -> Passes:
         """Return tips for lines on the surface, put exactly on it, and the axis."""
