@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -103,7 +104,9 @@ def refused_of(job):
 
 def test_what_the_passes_beside_dropped_cuts_reach_is_not_missed(tmp_path):
     """Nearly as much is dropped of both caps; of the second the ball reaches all on its way beside that."""
-    assert "0.52 % of the region" in str(refused_of(leaning(tmp_path, 80.0, 0.3)))
+    told = re.search(r"about ([0-9.]+) % of the region", str(refused_of(leaning(tmp_path, 80.0, 0.3))))
+    assert told is not None
+    assert 0.4 < float(told[1]) < 0.6
     assert refused_of(leaning(tmp_path, 75.0, 0.35)) is None
 
 
