@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
-from pentapod.base.errors import ToolpathError
+from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal
 from pentapod.job.advice.options import AdviceOptions, Tried
 from pentapod.job.advice.search import advised
@@ -230,7 +230,7 @@ def _otherwise(
     make = partial(_toolpath, job, task.machine, mesh, None, runner, None)
     try:
         specification = job_specification(job, task.machine, mesh, make, own_machine=own_machine)
-    except ToolpathError:  # no cut is left
+    except InputError:  # no cut is left, or its surface is too large: the first refusal says more
         return failed
     again = dataclasses.replace(task, job=job, specification=specification, runner=runner)
     file.unlink(missing_ok=True)
