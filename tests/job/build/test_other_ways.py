@@ -7,7 +7,7 @@ import pytest
 from trimesh.convex import convex_hull
 
 import concave_parts
-from pentapod.base.errors import ProgramError
+from pentapod.base.errors import MeshError, ProgramError
 from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.cli.commands.new import dome_stl
 from pentapod.job import Job, judge, run
@@ -25,10 +25,17 @@ from pentapod.job.build.pieces import program_toolpath
 from pentapod.job.build.region import rolls
 from pentapod.job.build.specification import job_coverage
 from pentapod.job.build.values import job_mesh
+from pentapod.job.mending import other_way
+from pentapod.job.outcome import Outcome, Stage
 from pentapod.job.task import Task
+from pentapod.machine.machine import Machine
 from pentapod.mesh.io.stl import write_stl
 from pentapod.program import read_header, write_csv
 from pentapod.toolpath import SegmentKind
+from pentapod.toolpath.surfaces.tip_surface import TipSurface
+from pentapod.verify import Verdict
+from pentapod.verify.surface.surface_left import SURFACE_LEFT
+from pentapod.verify.verdict.verdict import Certificate, Place
 from short_motion import motion
 
 SLOPE = float(np.tan(np.radians(20.0)))
@@ -164,6 +171,41 @@ def test_the_header_says_how_near_the_passes_are_and_the_toolpath_is_made_so(job
     assert cuts[0] > 1.5 * cuts[1]
     # A header that says so of a job that does not do it changes nothing.
     assert len(program_toolpath(job, job_mesh(job), file)) == len(program_toolpath(job, job_mesh(job), plain))
+
+
+def failing(job, *claims, limits=()):
+    """The outcome of a job whose program fails claims, or whose placement exceeds limits."""
+    refusal = Refusal(
+        "verdict" if claims else "placement", "no", tuple(Shortfall(n, ((0, 9),), 0.2, "mm") for n in limits)
+    )
+    certificates = tuple(Certificate(name, False, 2.0, 0.1, "%", Place(), "") for name in claims)
+    return Outcome(job, Machine.load("desk"), (Stage("refused", 0.0, refusal),), Verdict(certificates))
+
+
+def test_what_fails_decides_on_the_other_way(job):
+    upright, flat = job.with_(**FLAT), job.with_(tool={"type": "flat"}, axis={"tilt_deg": None})
+    assert stepover_share(other_way(upright, failing(upright, SURFACE_LEFT))[0]) == 0.5
+    assert other_way(upright, failing(upright, SURFACE_LEFT, "lowest feed")) is None
+    assert other_way(upright, failing(upright, limits=("leg 1 too long",))) is None
+    made = nearer(upright)
+    assert other_way(made, failing(made, SURFACE_LEFT)) is None
+    assert stands(other_way(flat, failing(flat, limits=("leg 1 too long",)))[0])
+    assert other_way(job, failing(job, SURFACE_LEFT)) is None
+    assert stands(other_way(job, failing(job, limits=("tool body touches the part",)))[0])
+
+
+def test_another_way_that_has_no_surface_leaves_the_first_refusal(job, tmp_path, monkeypatch):
+    flat = job.with_(tool={"type": "flat"}, axis={"tilt_deg": None})
+    refusal = Refusal("placement", "no", (Shortfall("leg 1 too long", ((0, 9000),), 0.2, "mm"),))
+
+    def too_large(*given, **more):
+        raise MeshError("the tip surface is too fine for this part", key="step")
+
+    monkeypatch.setattr(Task, "program", lambda self, file: self.runner.run("placement", lambda: refusal))
+    monkeypatch.setattr(TipSurface, "of", too_large)
+    done = run(flat, tmp_path / "out", advice=None)
+    assert done.refusal == refusal
+    assert not (tmp_path / "out" / "program.csv").exists()
 
 
 @pytest.mark.slow
