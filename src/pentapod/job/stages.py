@@ -14,6 +14,7 @@ from pentapod.job.advice.search import advised
 from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, write_arrays, write_json
 from pentapod.job.build.left import FORBIDDEN, foreseen
 from pentapod.job.build.limits import pose_limits, timing_limits
+from pentapod.job.build.other_ways import stands
 from pentapod.job.build.pieces import job_part, job_piece, job_without
 from pentapod.job.build.region import covers_region
 from pentapod.job.build.specification import job_specification
@@ -243,8 +244,9 @@ def _otherwise(
             task.runner.stages = runner.stages
             return outcome
     if outcome.passed:
-        left = next(each.method for each in outcome.verdict.certificates if each.claim == SURFACE_LEFT)
-        runner.stages.append(Stage("left", 0.0, None, f"{SURFACE_LEFT}: {left.rsplit('; ', 1)[-1]}"))
+        if stands(job):  # what it does not reach
+            left = next(each.method for each in outcome.verdict.certificates if each.claim == SURFACE_LEFT)
+            runner.stages.append(Stage("left", 0.0, None, f"{SURFACE_LEFT}: {left.rsplit('; ', 1)[-1]}"))
         task.runner.stages = runner.stages
         return _written(again, outcome.verdict, staging, writers)
     file.unlink(missing_ok=True)
