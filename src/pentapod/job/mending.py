@@ -7,6 +7,7 @@ Where the program is slower than it has to be, its time law is searched for long
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,11 +23,12 @@ from pentapod.job.build.other_ways import (
     STANDS,
     STANDS_ON_END,
     ends,
-    may_come_nearer,
     may_stand,
     nearer,
+    nearer_share,
     nearer_words,
     standing,
+    stepover_share,
 )
 from pentapod.job.build.region import covers_region
 from pentapod.job.outcome import Outcome
@@ -52,6 +54,7 @@ class MendOptions:
     better time law keeps; law: options of the search for it. apart: claims that a leg path nearer to the toolpath
     keeps; closer: its share of the tolerances. loaded: claims that a time law within less than the legs' limits keeps,
     since drives are told more than the legs' own motion where they compensate for what these yield; gentler: its share.
+    helps: passes come nearer together once more only if what is left fell below this share of what was left before.
     """
 
     rounds: int = 3
@@ -72,6 +75,7 @@ class MendOptions:
     closer: float = 0.8
     loaded: tuple[str, ...] = ("leg rates", "leg accelerations", "leg jerks")
     gentler: float = 0.97
+    helps: float = 0.5
     law: JerkOptions = field(default_factory=lambda: JerkOptions(passes=24, rough_passes=4, min_gain=1e-5))
 
 
@@ -115,8 +119,13 @@ def most_left_out(job: Job, options: MendOptions = OPTIONS) -> float:
     return min(options.most * job.tolerance.left_share, options.ever)
 
 
-def other_way(job: Job, outcome: Outcome) -> tuple[Job, str] | None:
-    """Return the job done in another way after a run that failed, and what is said of it; None where none is known."""
+def other_way(
+    job: Job, outcome: Outcome, before: Outcome | None = None, options: MendOptions = OPTIONS
+) -> tuple[Job, str] | None:
+    """Return the job done in another way after a run that failed, and what is said of it; None where none is known.
+
+    before: the run of which this one was another way.
+    """
     if outcome.refusal is None:
         return None
     failed = failures(outcome.verdict)
@@ -124,10 +133,19 @@ def other_way(job: Job, outcome: Outcome) -> tuple[Job, str] | None:
     touches = any(name.startswith(TOUCHES) for name in (*limits, *failed))
     if may_stand(job) and (touches or ends(job)):
         return standing(job), STANDS_ON_END if ends(job) else STANDS
-    if may_come_nearer(job) and outcome.refusal.stage == STAGE and set(failed) == {SURFACE_LEFT}:
-        made = nearer(job)
-        return made, nearer_words(made)
-    return None
+    share = nearer_share(job)
+    if share is None or outcome.refusal.stage != STAGE or set(failed) != {SURFACE_LEFT}:
+        return None
+    last = {} if before is None or stepover_share(job) == 1.0 else failures(before.verdict)
+    if SURFACE_LEFT in last and not _value(failed) < options.helps * _value(last):
+        return None  # passes that came nearer already did not help
+    made = nearer(job, share)
+    return made, nearer_words(made)
+
+
+def _value(failed: Mapping[str, Certificate]) -> float:
+    """Return the share of the region that is left, percent."""
+    return failed[SURFACE_LEFT].value or 0.0
 
 
 def mend_of(

@@ -238,7 +238,7 @@ def _otherwise(
     outcome = _planned(again, staging, writers)
     if not outcome.passed:
         outcome = _mended(again, mesh, outcome, staging, writers)
-    if not outcome.passed and (other := other_way(job, outcome)) is not None:
+    if not outcome.passed and (other := other_way(job, outcome, failed)) is not None:
         outcome = _otherwise(again, mesh, outcome, *other, staging, writers)
         if outcome.passed:
             task.runner.stages = runner.stages

@@ -13,9 +13,10 @@ from pentapod.cli.commands.new import dome_stl
 from pentapod.job import Job, judge, run
 from pentapod.job.build.other_ways import (
     as_made,
-    may_come_nearer,
     may_stand,
     nearer,
+    nearer_share,
+    nearer_words,
     nearer_words,
     standing,
     stands,
@@ -83,13 +84,13 @@ def test_an_upright_tool_may_do_jobs_whose_axis_is_the_planners(job):
 
 def test_both_ways_together_are_told_apart_from_what_was_asked_for(job):
     flat = job.with_(tool={"type": "flat"}, axis={"tilt_deg": None})
-    made = nearer(standing(flat))
+    made = nearer(standing(flat), 0.5)
     assert made.asked is flat
     assert made.digest == flat.digest
     assert (stands(made), stepover_share(made)) == (True, 0.5)
     assert "third attempt" in nearer_words(made)
     assert not may_stand(made)
-    assert not may_come_nearer(made)
+    assert nearer_share(made) == 0.3
     header = replace(motion(0.1)[0].provenance, upright=True, stepover_share=0.5)
     assert as_made(flat, header).tables == made.tables
 
@@ -133,7 +134,7 @@ FLAT = {
 
 def test_passes_come_nearer_with_the_bound_of_what_was_asked_for(job):
     flat = job.with_(**FLAT)
-    made = nearer(flat)
+    made = nearer(flat, 0.5)
     assert made.digest == flat.digest
     assert made.asked is flat
     assert made.toolpath.stepover_mm == 3.0
@@ -143,22 +144,29 @@ def test_passes_come_nearer_with_the_bound_of_what_was_asked_for(job):
     left = [job_coverage(each, job_mesh(each)).left for each in (flat, made)]
     assert left[0] == pytest.approx(left[1], rel=1e-12)
     bounded = flat.with_(tolerance={"left_mm": 0.3})
-    assert nearer(bounded).tolerance.left_mm == 0.3
+    assert nearer(bounded, 0.5).tolerance.left_mm == 0.3
 
 
 def test_ridges_of_a_quarter_of_the_height_are_half_as_far_apart(job):
     bull = {"tool": {"type": "bull", "diameter_mm": 6.0, "corner_mm": 1.0}, "axis": FLAT["axis"]}
-    made = nearer(job.with_(toolpath={"stepover_mm": None, "scallop_mm": 0.04}, **bull))
+    made = nearer(job.with_(toolpath={"stepover_mm": None, "scallop_mm": 0.04}, **bull), 0.5)
     assert made.toolpath.scallop_mm == pytest.approx(0.01)
     assert stepover_share(made) == pytest.approx(0.5)
 
 
-def test_passes_come_nearer_for_bull_and_flat_ends_and_once(job):
+def test_passes_come_nearer_for_bull_and_flat_ends_and_twice(job):
     flat = job.with_(**FLAT)
-    assert may_come_nearer(flat)
-    assert not may_come_nearer(nearer(flat))
-    assert not may_come_nearer(job)
-    assert not may_come_nearer(flat.with_(toolpath={"strategy": "edges", "stepover_mm": None}))
+    assert nearer_share(flat) == 0.5
+    near = nearer(flat, 0.5)
+    assert nearer_share(near) == 0.3
+    nearest = nearer(near, 0.3)
+    assert nearer_share(nearest) is None
+    assert nearest.toolpath.stepover_mm == pytest.approx(0.3 * flat.toolpath.stepover_mm)
+    assert nearest.tolerance.left_mm == near.tolerance.left_mm
+    assert nearest.digest == flat.digest
+    assert [nearer_words(each).split(" ")[0] for each in (near, nearest)] == ["second", "third"]
+    assert nearer_share(job) is None
+    assert nearer_share(flat.with_(toolpath={"strategy": "edges", "stepover_mm": None})) is None
 
 
 def test_the_header_says_how_near_the_passes_are_and_the_toolpath_is_made_so(job, tmp_path):
@@ -173,12 +181,12 @@ def test_the_header_says_how_near_the_passes_are_and_the_toolpath_is_made_so(job
     assert len(program_toolpath(job, job_mesh(job), file)) == len(program_toolpath(job, job_mesh(job), plain))
 
 
-def failing(job, *claims, limits=()):
+def failing(job, *claims, limits=(), left=2.0):
     """The outcome of a job whose program fails claims, or whose placement exceeds limits."""
     refusal = Refusal(
         "verdict" if claims else "placement", "no", tuple(Shortfall(n, ((0, 9),), 0.2, "mm") for n in limits)
     )
-    certificates = tuple(Certificate(name, False, 2.0, 0.1, "%", Place(), "") for name in claims)
+    certificates = tuple(Certificate(name, False, left, 0.1, "%", Place(), "") for name in claims)
     return Outcome(job, Machine.load("desk"), (Stage("refused", 0.0, refusal),), Verdict(certificates))
 
 
@@ -187,8 +195,11 @@ def test_what_fails_decides_on_the_other_way(job):
     assert stepover_share(other_way(upright, failing(upright, SURFACE_LEFT))[0]) == 0.5
     assert other_way(upright, failing(upright, SURFACE_LEFT, "lowest feed")) is None
     assert other_way(upright, failing(upright, limits=("leg 1 too long",))) is None
-    made = nearer(upright)
-    assert other_way(made, failing(made, SURFACE_LEFT)) is None
+    made, first = nearer(upright, 0.5), failing(upright, SURFACE_LEFT)
+    assert stepover_share(other_way(made, failing(made, SURFACE_LEFT, left=0.2), first)[0]) == pytest.approx(0.3)
+    assert other_way(made, failing(made, SURFACE_LEFT, left=1.9), first) is None
+    last = nearer(made, 0.3)
+    assert other_way(last, failing(last, SURFACE_LEFT, left=0.2), failing(made, SURFACE_LEFT)) is None
     assert stands(other_way(flat, failing(flat, limits=("leg 1 too long",)))[0])
     assert other_way(job, failing(job, SURFACE_LEFT)) is None
     assert stands(other_way(job, failing(job, limits=("tool body touches the part",)))[0])

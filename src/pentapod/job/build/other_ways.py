@@ -23,8 +23,11 @@ from pentapod.program.program import Provenance
 from pentapod.toolpath.strategies.registry import STRATEGIES
 from pentapod.verify import Coverage
 
-NEARER = 0.5
-"""Distance between passes, as a share of what is asked for, where they come nearer together."""
+NEARER = (0.5, 0.3)
+"""Distances between passes, as shares of what is asked for, that are tried where passes come nearer together."""
+
+ATTEMPTS = ("first", "second", "third", "fourth")
+"""How the plans of a run are counted in words."""
 
 STANDS = (
     "second attempt: the tool stays upright, and passes end where the part leans over them, because no lean was found "
@@ -43,7 +46,7 @@ def as_made(job: Job, made_from: Provenance) -> Job:
     """Return the job as a program does it: in another way, where its header says so and the job lets it."""
     if made_from.upright and may_stand(job):
         job = standing(job)
-    if made_from.stepover_share < 1.0 and may_come_nearer(job):
+    if made_from.stepover_share < 1.0 and nearer_share(job) is not None:
         job = nearer(job, made_from.stepover_share)
     return job
 
@@ -68,9 +71,14 @@ def stands(job: Job) -> bool:
     return job.asked is not None and job.axis.mode != job.asked.axis.mode
 
 
-def may_come_nearer(job: Job) -> bool:
-    """Return whether passes nearer together may do a job: a bull or flat end covers a region."""
-    return stepover_share(job) == 1.0 and covers_region(job) and ends(job)
+def nearer_share(job: Job) -> float | None:
+    """Return the next share of the asked distance between passes that may do a job; None where none is left.
+
+    Only where a bull or flat end covers a region.
+    """
+    if not (covers_region(job) and ends(job)):
+        return None
+    return next((share for share in NEARER if share < stepover_share(job)), None)
 
 
 def ends(job: Job) -> bool:
@@ -78,24 +86,26 @@ def ends(job: Job) -> bool:
     return issubclass(CUTTERS[job.tool.type], BullNose)
 
 
-def nearer(job: Job, share: float = NEARER) -> Job:
+def nearer(job: Job, share: float) -> Job:
     """Return the job with passes nearer together, and the same bound of what may be left. Its digest stays.
 
     share: of the asked distance between passes.
     """
-    table = job.toolpath.model_dump(include={"stepover_mm", "scallop_mm"}, exclude_none=True)
+    asked = job.asked or job
+    table = asked.toolpath.model_dump(include={"stepover_mm", "scallop_mm"}, exclude_none=True)
     # The height of a ridge grows with the square of the distance between passes.
     closer = {key: value * (share if key == "stepover_mm" else share**2) for key, value in table.items()}
-    left = job.tolerance.left_mm or from_si(_allowed_left(job), "mm")
+    left = job.tolerance.left_mm or from_si(_allowed_left(asked), "mm")
     made = job.with_(toolpath=closer, tolerance={"left_mm": left})
-    return replace(made, asked=job.asked or job, from_file=job.from_file)
+    return replace(made, asked=asked, from_file=job.from_file)
 
 
 def nearer_words(job: Job) -> str:
     """Return what is said of a job that passes nearer together do."""
-    number, left = "third" if stands(job) else "second", f"{job.tolerance.left_mm:.3g} mm"
-    passes = f"passes are {stepover_share(job):.2g} times as far apart as asked"
-    return f"{number} attempt: {passes}, because more than {left} would be left between them"
+    share, left = stepover_share(job), f"{job.tolerance.left_mm:.3g} mm"
+    before = stands(job) + sum(each > share for each in NEARER)
+    passes = f"passes are {share:.2g} times as far apart as asked"
+    return f"{ATTEMPTS[1 + before]} attempt: {passes}, because more than {left} would be left between them"
 
 
 def stepover_share(job: Job) -> float:
