@@ -17,7 +17,6 @@ from pentapod.job.build.other_ways import (
     nearer,
     nearer_share,
     nearer_words,
-    nearer_words,
     standing,
     stands,
     stepover_share,
