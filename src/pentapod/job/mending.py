@@ -112,6 +112,13 @@ class Mend(Value):
         )
 
 
+@dataclass(frozen=True)
+class FailedWay(Value):
+    """Another way in which a run planned its job, and that failed. claims: that do not hold, by name."""
+
+    claims: frozenset[str]
+
+
 def most_left_out(job: Job, options: MendOptions = OPTIONS) -> float:
     """Return the share of its cuts that a job's program may leave out: none where no claim judges what is left."""
     if not covers_region(job) and job.tolerance.si.left is None:

@@ -98,4 +98,10 @@ def tried(job: Job, progress: Progress = silent, **given: Any) -> Tried:
         outcome = run(job, folder, ending_when_interrupted(progress), advice=None, **given)
     if outcome.passed:
         return Tried(None, outcome.margin)
-    return Tried("verdict" if outcome.refusal is None else outcome.refusal.stage)
+    # Loaded by the run.
+    from pentapod.job.mending import FailedWay  # noqa: PLC0415
+    from pentapod.job.withheld import failures  # noqa: PLC0415
+
+    stage = "verdict" if outcome.refusal is None else outcome.refusal.stage
+    way = outcome.find(FailedWay)
+    return Tried(stage, failed=frozenset(failures(outcome.verdict)) if way is None else way.claims)

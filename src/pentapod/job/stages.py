@@ -20,7 +20,7 @@ from pentapod.job.build.region import covers_region
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import Reports, job_link_style, job_toolpath
 from pentapod.job.mending import OPTIONS as MENDING
-from pentapod.job.mending import mend_of, most_left_out, other_way
+from pentapod.job.mending import FailedWay, mend_of, most_left_out, other_way
 from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage, refusal_verdict
 from pentapod.job.plan_arrays import arrays_of
 from pentapod.job.plan_before import PlanBefore
@@ -106,7 +106,9 @@ def with_advice(
     search = (task.job, task.machine, mesh, task.toolpath, again, options, runner.progress)
     failed = failures(outcome.verdict) if refusal.stage == STAGE else {}
     forbidden = refusal.stage == FORBIDDEN
-    found = runner.run("advice", lambda: advised(*search, failed, refusal.diagnosis, forbidden=forbidden))
+    otherwise = outcome.find(FailedWay)
+    own = frozenset[str]() if otherwise is None else otherwise.claims
+    found = runner.run("advice", lambda: advised(*search, failed, refusal.diagnosis, own, forbidden=forbidden))
     better = refusal.with_advice(found.advice, found.sentence)
     runner.stages = [s if s.value is not refusal else s.with_value(better) for s in runner.stages]
     verdict = outcome.verdict if failed else refusal_verdict(better, task.specification.sources)
@@ -221,7 +223,7 @@ def _otherwise(
 ) -> Outcome:
     """Go back after a run that failed, and plan the job as it is done in another way, of which `words` are said.
 
-    Returns the failed outcome where that does not pass.
+    Returns the failed outcome where that does not pass, which then says so.
     """
     runner, file = StageRunner(task.runner.progress), staging / WITHHELD
     first = file.read_bytes() if file.is_file() else None
@@ -252,6 +254,11 @@ def _otherwise(
     file.unlink(missing_ok=True)
     if first is not None:
         file.write_bytes(first)
+    why = "" if outcome.refusal is None else f": {dataclasses.replace(outcome.refusal, remedy='')}"
+    task.runner.stages += [
+        Stage(ANOTHER_WAY, 0.0, FailedWay(frozenset(failures(outcome.verdict))), f"{words}. It failed, too{why}"),
+        *(stage for stage in runner.stages if isinstance(stage.value, FailedWay)),
+    ]
     return _written(task, failed.verdict, staging, writers)
 
 

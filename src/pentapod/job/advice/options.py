@@ -9,10 +9,14 @@ from pentapod.base.values import Value
 
 
 class Tried(NamedTuple):
-    """How a plan ended. stage: that refused it, None where its verdict passed. margin: its smallest, if it is known."""
+    """How a plan ended. stage: that refused it, None where its verdict passed. margin: its smallest, if it is known.
+
+    failed: names of the claims that fail, of the other way in which it was planned where there is one.
+    """
 
     stage: str | None
     margin: float | None = None
+    failed: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from pentapod.job.advice.settings import TOUCHES, Settings, Tell, joined, merged
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.advice.starts import starts
 from pentapod.job.advice.trials import FEWEST, Because, Ended, Trial, Trials
+from pentapod.job.build.other_ways import may_stand
 from pentapod.job.build.tool import job_tool
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
@@ -74,19 +75,21 @@ def advised(
     progress: Progress,
     failed: Mapping[str, Certificate] = MappingProxyType({}),
     short: Sequence[Shortfall] = (),
+    otherwise: frozenset[str] = frozenset(),
     *,
     forbidden: bool = False,
 ) -> Advised:
     """Return changes with which a job that cannot be done is planned, and its verdict passes.
 
     machine, mesh: the job's. toolpath: None where none could be made. failed: claims about its program that fail;
-    short: limits that its placement exceeds. forbidden: whether shank or holder forbid what its ball reaches.
+    short: limits that its placement exceeds; otherwise: claims that fail where it is planned in another way.
+    forbidden: whether shank or holder forbid what its ball reaches.
     """
     found: list[Advice] = []
     tried: dict[str, None] = {}
     reasons: dict[str, None] = {}
     count, interrupted = options.replans if failed else options.plans, False
-    ended: list[str | None] = [None]
+    ended: list[Tried | None] = [None]
     shown = _Shown(progress, count)
     progress("advice", 0.0, "changes of the job are tried; Ctrl-C ends the search")
 
@@ -96,16 +99,18 @@ def advised(
             shown.estimate(words)
 
     about = (lambda words: reasons.update({words: None}), lambda: ended[-1], toolpath is not None and not short)
-    trials = _trials(job, machine, mesh, toolpath, options, tell, *about)
+    trials = _trials(job, machine, mesh, toolpath, options, tell, *about, otherwise)
     if toolpath is not None:
         claims = FailedClaims(job, machine, mesh, toolpath, failed, options, tell)
         touches = any(each.constraint.startswith(TOUCHES) for each in short)
-        first = claims.upright() if touches else claims.reaching() if forbidden else ()
+        # Where it may, a run has planned an upright tool by itself.
+        upright = touches and not may_stand(job)
+        first = claims.upright() if upright else claims.reaching() if forbidden else ()
         trials = chain(first, claims.all(), trials)
     try:
         for number, trial in enumerate(islice(trials, count)):
             tried[trial.words] = None
-            ended.append((plan := _ended(planned, job, trial, partial(shown.plan, number, trial.words))).stage)
+            ended.append(plan := _ended(planned, job, trial, partial(shown.plan, number, trial.words)))
             shown.number = number + 1
             if plan.stage is None:
                 changes = (Change(table, *item) for table, keys in trial.changes.items() for item in keys.items())
@@ -168,6 +173,7 @@ def _trials(
     because: Because,
     ended: Ended,
     placed: bool,
+    otherwise: frozenset[str],
 ) -> Iterator[Trial]:
     """Yield the trials of the jobs to begin with."""
     for start in starts(job, machine, mesh, options, has_toolpath=toolpath is not None):
@@ -181,7 +187,8 @@ def _trials(
         if sketch is None or len(sketch.contacts) < FEWEST:
             continue
         settings = Settings(start.job, machine, start.mesh, sketch, path, options, tell)
-        trials = Trials(settings, because, ended, placed=placed and not start.changes)
+        own = not start.changes
+        trials = Trials(settings, because, ended, placed=placed and own, otherwise=otherwise if own else frozenset())
         for trial in trials.all(own=bool(start.changes)):
             words, changes = joined(start.words, trial.words), merged(start.changes, trial.changes)
             yield replace(trial, words=words, changes=changes, kept=start.kept * trial.kept)

@@ -12,12 +12,16 @@ import numpy as np
 from pentapod.base.errors import InputError
 from pentapod.base.units import from_si, to_si
 from pentapod.job.advice.axes import Changes
-from pentapod.job.advice.options import AdviceOptions
+from pentapod.job.advice.options import AdviceOptions, Tried
 from pentapod.job.advice.parts import Regions, Smaller
 from pentapod.job.advice.places import Place
 from pentapod.job.advice.settings import Setting, Settings, joined, merged
 from pentapod.job.build.values import job_machine
 from pentapod.planning.estimate import Estimate
+from pentapod.verify.surface.surface_left import SURFACE_LEFT
+
+LEFT_ALONE = frozenset((SURFACE_LEFT,))
+"""What fails where the tool leaves too much, wherever the part is placed."""
 
 FEWEST = 4
 """Points below which a sketch shows nothing."""
@@ -25,8 +29,8 @@ FEWEST = 4
 Because = Callable[[str], None]
 """Takes words for why nothing else is tried, or what stands in the way of all that was."""
 
-Ended = Callable[[], str | None]
-"""Returns the stage that refused the last trial; None where it passed, or there was none."""
+Ended = Callable[[], Tried | None]
+"""Returns how the last trial ended; None where there was none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +46,16 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Trials:
-    """The trials of one job, from estimates for its settings. placed: whether its own plan had a place for the part."""
+    """The trials of one job, from estimates for its settings. placed: whether its own plan had a place for the part.
+
+    otherwise: claims that failed in the other way in which a run planned it.
+    """
 
     settings: Settings
     because: Because
     ended: Ended
     placed: bool = False
+    otherwise: frozenset[str] = frozenset()
 
     @property
     def options(self) -> AdviceOptions:
@@ -71,7 +79,8 @@ class Trials:
             yield from self._scarcely(own)
         for base in bases:
             # More set-ups are for parts that have no place in one: a program that fails in one fails again.
-            if base not in self._programmed and not (self.placed and not base.words):
+            programmed = base in self._programmed or base.axis.words in self._failing
+            if not programmed and not (self.placed and not base.words):
                 yield from self._setups(base)
         for base in bases:
             yield from self._smaller(base)
@@ -94,7 +103,7 @@ class Trials:
         scant: list[Setting] = []
         for axis in self.settings.of(place):
             setting = self.settings.setting(axis, place)
-            if not (own or setting.words) or setting.found.margin < self.options.enough:
+            if not (own or setting.words) or axis.words in self._failing or setting.found.margin < self.options.enough:
                 continue
             if not self.settings.is_usual(setting):
                 self.because(f"{setting.words}: it fits, but beside the work volume, where nobody builds a table")
@@ -105,24 +114,37 @@ class Trials:
                 yield from self._of_setting(setting)
         # Of about the same margin, those count that are cheap to plan.
         for setting in sorted(scant, key=lambda s: -round(s.found.margin, 2)):
-            yield from self._of_setting(setting)
+            if setting.axis.words not in self._failing:
+                yield from self._of_setting(setting)
 
     def _of_setting(self, setting: Setting) -> Iterator[Trial]:
         yield Trial(setting.words, setting.changes, 1.0, 1.0)
-        if self.ended() not in (None, "placement"):
+        last = self.ended()
+        if last is None or last.stage is None:
+            return
+        if last.stage != "placement":
             self._programmed.append(setting)
+        if last.failed == LEFT_ALONE:
+            self._failing.add(setting.axis.words)
 
     @cached_property
     def _programmed(self) -> list[Setting]:
         """The settings that had a place for the part in their plans, and failed later."""
         return []
 
+    @cached_property
+    def _failing(self) -> set[str]:
+        """Words of tool axes with which too much is left on the surface, wherever the part is placed."""
+        return {""} if self.otherwise == LEFT_ALONE else set()
+
     def _scarcely(self, own: bool) -> Iterator[Trial]:
         """Yield the best change of tool axes and placement that fits by its estimate, but hardly: a plan finds more."""
         scarce = [
             setting
             for setting in self.settings.looked_at
-            if (own or setting.words) and self.options.scarcely <= setting.found.margin < self.options.enough
+            if (own or setting.words)
+            and setting.axis.words not in self._failing
+            and self.options.scarcely <= setting.found.margin < self.options.enough
         ]
         for setting in sorted(scarce, key=lambda s: -s.found.margin)[:1]:
             yield from self._of_setting(setting)
