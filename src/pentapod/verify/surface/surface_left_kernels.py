@@ -9,6 +9,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.numerics.kernels import kernel
 from pentapod.verify.surface.swept_cutter_kernels import (
+    BALL,
     ENTERED_M,
     STACK,
     Room,
@@ -21,7 +22,7 @@ from pentapod.verify.surface.swept_cutter_kernels import (
 
 
 @kernel
-def _covers(corners: Floats, rise: Floats, stretch: Floats, solid: Floats, is_ball: bool, share: float) -> bool:
+def _covers(corners: Floats, rise: Floats, stretch: Floats, solid: Floats, kind: int, share: float) -> bool:
     """Return whether a solid on one stretch contains a whole triangle (3, 3), moved by `rise` (3,).
 
     The swept volume of a ball along a straight stretch is convex, so its corners may be inside at different places;
@@ -31,10 +32,10 @@ def _covers(corners: Floats, rise: Floats, stretch: Floats, solid: Floats, is_ba
     for j in range(3):
         for i in range(3):
             x[i] = corners[j, i] + rise[i]
-        if is_ball:
-            if to_stretch(x, stretch, solid, is_ball)[0] > 0.0:
+        if kind == BALL:
+            if to_stretch(x, stretch, solid, kind)[0] > 0.0:
                 return False
-        elif at_share(x, stretch, solid, share) + stretch[12] > 0.0:
+        elif at_share(x, stretch, solid, share, kind) + stretch[12] > 0.0:
             return False
     return True
 
@@ -105,7 +106,7 @@ def uncovered(
     Returns how many there are; if that is more than K, not all were written. deepest (4,): raised to the largest height
     that is left at the middle of a covered cell, and its place.
     """
-    stretches, _, _, solid, _, is_ball = swept
+    stretches, _, _, solid, _, kind = swept
     room, warm = (np.empty(STACK, dtype=np.intp), np.empty(STACK)), -1
     cells, middle, x, rise = np.empty((STACK, 3, 3)), np.empty(3), np.empty(3), np.empty(3)
     total = 0
@@ -123,12 +124,19 @@ def uncovered(
                 _halve(cells, count)
                 count += 1
                 continue
-            gap, warm, share = nearest_stretch(x, warm, -reach, reach + ENTERED_M, swept, room)
-            if gap <= -reach or (gap <= 0.0 and _covers(cell, rise, stretches[warm], solid, is_ball, share)):
+            halves = reach > fine and count < STACK
+            # The first place that holds the middle covers most cells. Where it does not, the deepest one decides.
+            within = ENTERED_M + (reach if halves else 0.0)
+            gap, warm, share = nearest_stretch(x, warm, 0.0, within, swept, room)
+            covered = gap <= 0.0 and _covers(cell, rise, stretches[warm], solid, kind, share)
+            if gap <= 0.0 and not covered:
+                gap, warm, share = nearest_stretch(x, warm, -reach, within, swept, room)
+                covered = gap <= -reach or _covers(cell, rise, stretches[warm], solid, kind, share)
+            if covered:
                 count -= 1
                 _deepen(middle, normals[f], height, warm, swept, room, deepest)
                 continue
-            if gap <= reach and reach > fine and count < STACK:
+            if gap <= reach and halves:
                 _halve(cells, count)
                 count += 1
                 continue

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.geometry.directions import normalised, tangent_frame
 from pentapod.geometry.solids import Solid
 from pentapod.mesh.query.tree import along_morton_curve
+from pentapod.numerics.threads import for_rows, in_threads
 from pentapod.verify.replay.replay import Replay
 from pentapod.verify.replay.stretches import Stretches, StretchOptions, deviation_bounds
 
@@ -19,6 +22,12 @@ if TYPE_CHECKING:
 PER_LEAF = 4
 """Stretches in a leaf of the tree."""
 
+BLOCKS = 32
+"""Blocks into which a surface is divided, whatever the number of threads."""
+
+FIXED_SHARE = 0.1
+"""Share of the deviation from straight stretches by which an axis that counts as fixed may turn the solid."""
+
 
 @dataclass(frozen=True, eq=False)
 class SweptSolid:
@@ -26,7 +35,8 @@ class SweptSolid:
 
     stretches (S, 13): start and displacement of the tip (of a ball: of its centre), axis at start and end, and the
     bound on the deviation of the motion. boxes (2 L − 1, 6): around the solid's axis. starts (L + 1,): of the leaves.
-    numbers (5,): of the solid, as `Solid.numbers`; wide: its largest distance from its axis, metres.
+    numbers (5,): of the solid, as `Solid.numbers`; wide: its largest distance from its axis, metres. kind: as in
+    the kernels. frame (3, 3): where the axis never turns, rows are the axes of stretches and boxes; z is that axis.
     """
 
     stretches: Floats
@@ -34,7 +44,8 @@ class SweptSolid:
     starts: Ints
     numbers: Floats
     wide: float
-    is_ball: bool
+    kind: int
+    frame: Floats | None
 
     @classmethod
     def of(cls, replay: Replay, solid: Solid, chords: Bools, near: float) -> SweptSolid | None:
@@ -51,35 +62,70 @@ class SweptSolid:
         of, off = of.where(known), off[known]
         if not len(off):
             return None
-        first, last = replay.axes[of.starts], replay.axes[of.ends]
+        axes = replay.axes[of.starts], replay.axes[of.ends]
         drop = solid.low - tilt_centre if solid.is_ball else -tilt_centre
-        start, end = replay.tilt_centres[of.starts] + drop * first, replay.tilt_centres[of.ends] + drop * last
-        low, high = (0.0, 0.0) if solid.is_ball else (solid.low, solid.high)
-        ends = np.stack([start + low * first, start + high * first, end + low * last, end + high * last])
-        middles = ends.mean(axis=0)
+        ends = replay.tilt_centres[of.starts] + drop * axes[0], replay.tilt_centres[of.ends] + drop * axes[1]
+        numbers = np.array((0.0, 0.0, 0.0, 0.0, wide) if solid.is_ball else solid.numbers)
+        return cls.along(ends, axes, off, numbers, is_ball=solid.is_ball, near=near)
+
+    @classmethod
+    def along(
+        cls,
+        ends: tuple[Floats, Floats],
+        axes: tuple[Floats, Floats],
+        off: Floats,
+        numbers: Floats,
+        *,
+        is_ball: bool,
+        near: float,
+    ) -> SweptSolid:
+        """Return the swept volume along stretches of the solid's origin, ends two of (S, 3), with unit axes there.
+
+        off (S,): by how much the motion deviates from them, metres. An axis that turns the solid by less than a share
+        of `near`, metres, counts as fixed, and this as a part of the deviation.
+        """
+        from pentapod.verify.surface.swept_cutter_kernels import BALL, FIXED, TURNS  # noqa: PLC0415  loads numba
+
+        low, high, wide = float(numbers[0]), float(numbers[1]), float(numbers[2:4].max() + numbers[4])
+        (start, end), (first, last), kind = ends, axes, BALL if is_ball else TURNS
+        frame: Floats | None = None
+        if not is_ball:
+            lever = float(np.hypot(max(abs(low), abs(high)), wide))
+            axis = normalised(first.sum(axis=0) + last.sum(axis=0))
+            turn = lever * max(float(np.linalg.norm(each - axis, axis=1).max()) for each in axes)
+            if turn <= FIXED_SHARE * near:
+                kind, off = FIXED, off + turn
+                frame = np.stack([*tangent_frame(axis), axis])
+                start, end = start @ frame.T, end @ frame.T
+                first = last = np.broadcast_to([0.0, 0.0, 1.0], start.shape)
+        along = np.stack([start + low * first, start + high * first, end + low * last, end + high * last])
+        middles = along.mean(axis=0)
         order = along_morton_curve(middles, np.stack([middles.min(axis=0), middles.max(axis=0)]))
         rows = np.concatenate([start, end - start, first, last, off[:, None]], axis=1)[order]
         # An axis that turns evenly leaves the hull of its end positions by no more than this.
         bulge = 0.125 * max(abs(low), abs(high)) * float(np.sum((last - first) ** 2, axis=1).max())
-        boxes, starts = _boxes(ends.min(axis=0)[order] - bulge, ends.max(axis=0)[order] + bulge)
-        numbers = np.array((0.0, 0.0, 0.0, 0.0, wide) if solid.is_ball else solid.numbers)
-        return cls(np.ascontiguousarray(rows), boxes, starts, numbers, wide, solid.is_ball)
+        boxes, starts = _boxes(along.min(axis=0)[order] - bulge, along.max(axis=0)[order] + bulge)
+        return cls(np.ascontiguousarray(rows), boxes, starts, numbers, wide, kind, frame)
 
     @property
     def _swept(self) -> Swept:
-        return self.stretches, self.boxes, self.starts, self.numbers, self.wide, self.is_ball
+        return self.stretches, self.boxes, self.starts, self.numbers, self.wide, self.kind
+
+    def _framed(self, vectors: Floats) -> Floats:
+        """Return vectors (..., 3) in the frame of the stretches."""
+        return vectors if self.frame is None else np.ascontiguousarray(vectors @ self.frame.T)
 
     def entries(self, points: Floats, normals: Floats, heights: Floats) -> None:
         """Lower heights (N,), metres, to where rays from points along unit normals (N, 3) enter the swept volume."""
         from pentapod.verify.surface.swept_cutter_kernels import entries  # noqa: PLC0415  loads numba
 
-        entries(points, normals, self._swept, heights)
+        for_rows(entries, (self._framed(points), self._framed(normals)), (self._swept,), (heights,))
 
     def distances(self, points: Floats, gaps: Floats) -> None:
         """Lower gaps (N,), metres, to the distances of points (N, 3) from the swept volume."""
         from pentapod.verify.surface.swept_cutter_kernels import distances  # noqa: PLC0415  loads numba
 
-        distances(points, self._swept, gaps)
+        for_rows(distances, (self._framed(points),), (self._swept,), (gaps,))
 
     def uncovered(
         self, corners: Floats, normals: Floats, height: float, coarse: float, fine: float
@@ -90,13 +136,33 @@ class SweptSolid:
         """
         from pentapod.verify.surface.surface_left_kernels import uncovered  # noqa: PLC0415  loads numba
 
-        room = max(2 * len(corners), 1 << 14)
-        while True:
-            found, deepest = np.empty((room, 12)), np.array([0.0, np.nan, np.nan, np.nan])
-            count = uncovered(corners, normals, height, coarse, fine, self._swept, deepest, found)
-            if count <= room:
-                return found[:count], deepest
-            room = count
+        def done(block: slice) -> tuple[Floats, Floats]:
+            here = self._framed(corners[block]), self._framed(normals[block])
+            room = max(2 * len(here[0]), 1 << 14)
+            while True:
+                found, deepest = np.empty((room, 12)), np.array([0.0, np.nan, np.nan, np.nan])
+                count = uncovered(*here, height, coarse, fine, self._swept, deepest, found)
+                if count <= room:
+                    return found[:count], deepest
+                room = count
+
+        answers = list(in_threads(done, _of_equal_area(corners)))
+        if not answers:
+            return np.empty((0, 12)), np.array([0.0, np.nan, np.nan, np.nan])
+        cells = np.concatenate([found for found, _ in answers])
+        deepest = max((deepest for _, deepest in answers), key=lambda each: float(each[0]))
+        if self.frame is not None:
+            cells, deepest[1:] = (cells.reshape(-1, 4, 3) @ self.frame).reshape(-1, 12), deepest[1:] @ self.frame
+        return cells, deepest
+
+
+def _of_equal_area(corners: Floats) -> list[slice]:
+    """Return blocks of triangles (N, 3, 3) of about equal area, for as many cells in each."""
+    if not len(corners):
+        return []
+    edges = np.cumsum(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1))
+    inner = np.searchsorted(edges, np.arange(1, BLOCKS) * (edges[-1] / BLOCKS))
+    return [slice(a, b) for a, b in pairwise(np.unique(np.concatenate([[0], inner, [len(corners)]])).tolist())]
 
 
 def _stretches(replay: Replay, chords: Bools, lever: float, near: float) -> tuple[Stretches, Floats]:

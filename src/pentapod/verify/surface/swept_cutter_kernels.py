@@ -2,6 +2,8 @@
 
 On each *stretch* of the motion the solid moves straight while its axis turns evenly. The real motion deviates from that
 by at most the bound of the stretch, and the solid is shrunk by this bound. So what counts as removed is removed.
+
+Where the axis never turns, all is in a frame whose z is the axis: a distance takes one root, and boxes bound it closely.
 """
 
 from __future__ import annotations
@@ -16,9 +18,12 @@ from pentapod.numerics.kernels import kernel
 
 STACK = 128
 """Largest number of waiting nodes of a tree, or of waiting cells."""
-Swept = tuple[Floats, Floats, Ints, Floats, float, bool]
-"""The swept volume of one solid: stretches (S, 13), boxes (2 L − 1, 6), starts (L + 1,), the solid (5,), wide, and
-whether it is a ball. The boxes hold the axis of the solid, and no point of the solid is farther from it than `wide`."""
+TURNS, BALL, FIXED = 0, 1, 2
+"""Kinds of swept solids: those whose axis turns, balls, and those whose axis is z everywhere."""
+
+Swept = tuple[Floats, Floats, Ints, Floats, float, int]
+"""The swept volume of one solid: stretches (S, 13), boxes (2 L − 1, 6), starts (L + 1,), the solid (5,), wide, and its
+kind. The boxes hold the axis of the solid, and no point of the solid is farther from it than `wide`."""
 
 Room = tuple[Ints, Floats]
 """Memory of a search: nodes and their lower bounds, both (STACK,)."""
@@ -57,8 +62,11 @@ def _to_solid(h: float, out: float, solid: Floats) -> float:
 
 
 @kernel
-def at_share(x: Floats, stretch: Floats, solid: Floats, share: float) -> float:
-    """Return the signed distance of a point from a solid at a share of a stretch (13,)."""
+def at_share(x: Floats, stretch: Floats, solid: Floats, share: float, kind: int) -> float:
+    """Return the signed distance of a point from a solid, not a ball, at a share of a stretch (13,)."""
+    if kind == FIXED:
+        dx, dy = x[0] - stretch[0] - share * stretch[3], x[1] - stretch[1] - share * stretch[4]
+        return _to_solid(x[2] - stretch[2] - share * stretch[WAY_Z], math.sqrt(dx * dx + dy * dy), solid)
     rest = 1.0 - share
     ax = rest * stretch[6] + share * stretch[9]
     ay = rest * stretch[7] + share * stretch[10]
@@ -74,12 +82,12 @@ def at_share(x: Floats, stretch: Floats, solid: Floats, share: float) -> float:
 
 
 @kernel
-def to_stretch(x: Floats, stretch: Floats, solid: Floats, is_ball: bool) -> tuple[float, float]:
+def to_stretch(x: Floats, stretch: Floats, solid: Floats, kind: int) -> tuple[float, float]:
     """Return the signed distance of a point from a solid on a stretch, and the share of it where that is least.
 
     stretch (13,): start and displacement of the solid's origin, axis at start and end, bound on the deviation.
     """
-    if is_ball:
+    if kind == BALL:
         dx, dy, dz = x[0] - stretch[0], x[1] - stretch[1], x[2] - stretch[2]
         wx, wy, wz = stretch[3], stretch[4], stretch[WAY_Z]
         square = wx * wx + wy * wy + wz * wz
@@ -91,45 +99,51 @@ def to_stretch(x: Floats, stretch: Floats, solid: Floats, is_ball: bool) -> tupl
     # The distance from a convex body is convex along a straight line.
     low, high = 0.0, 1.0
     a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    fa, fb = at_share(x, stretch, solid, a), at_share(x, stretch, solid, b)
+    fa, fb = at_share(x, stretch, solid, a, kind), at_share(x, stretch, solid, b, kind)
     for _ in range(GOLDEN_STEPS):
         if fa <= fb:
             high, b, fb = b, a, fa
             a = high - GOLDEN * (high - low)
-            fa = at_share(x, stretch, solid, a)
+            fa = at_share(x, stretch, solid, a, kind)
         else:
             low, a, fa = a, b, fb
             b = low + GOLDEN * (high - low)
-            fb = at_share(x, stretch, solid, b)
+            fb = at_share(x, stretch, solid, b, kind)
     best, share = (fa, a) if fa <= fb else (fb, b)
     for end in range(2):
-        value = at_share(x, stretch, solid, float(end))
+        value = at_share(x, stretch, solid, float(end), kind)
         if value < best:
             best, share = value, float(end)
     return best + stretch[12], share
 
 
 @kernel
-def _may_be_nearer(x: Floats, stretch: Floats, solid: Floats, best: float) -> bool:
+def _may_be_nearer(x: Floats, stretch: Floats, solid: Floats, best: float, kind: int) -> bool:
     """Return whether a solid may come nearer to a point on a stretch than `best`: a convex function is above chords.
 
     From its middle it cannot fall to one end by more than it has risen from there to the other.
     """
     first, middle, last = (
-        at_share(x, stretch, solid, 0.0),
-        at_share(x, stretch, solid, 0.5),
-        at_share(x, stretch, solid, 1.0),
+        at_share(x, stretch, solid, 0.0, kind),
+        at_share(x, stretch, solid, 0.5, kind),
+        at_share(x, stretch, solid, 1.0, kind),
     )
     return min(first, last, 2.0 * middle - max(first, last)) + stretch[12] < best
 
 
 @kernel
-def _to_box(x: Floats, box: Floats) -> float:
-    square = 0.0
-    for j in range(3):
-        over = max(box[j] - x[j], 0.0, x[j] - box[3 + j])
-        square += over * over
-    return math.sqrt(square)
+def _to_box(x: Floats, box: Floats, solid: Floats, wide: float, kind: int) -> float:
+    """Return a lower bound of the signed distance of a point from a solid whose axis is in a box (6,)."""
+    dx, dy = max(box[0] - x[0], 0.0, x[0] - box[3]), max(box[1] - x[1], 0.0, x[1] - box[4])
+    dz = max(box[2] - x[2], x[2] - box[5])
+    square = dx * dx + dy * dy
+    if kind == FIXED:
+        out = math.sqrt(square) - max(solid[2], solid[3])
+        if out <= 0.0 or dz <= 0.0:
+            return max(out, dz) - solid[4]
+        return math.sqrt(out * out + dz * dz) - solid[4]
+    dz = max(dz, 0.0)
+    return math.sqrt(square + dz * dz) - wide
 
 
 @kernel
@@ -141,17 +155,17 @@ def nearest_stretch(
     Ends at the first place that is not farther than `enough`. within: only what is nearer is searched; where nothing
     is, it is the distance. warm: a stretch to start with, −1 for none; returned where nothing is nearer.
     """
-    stretches, boxes, starts, solid, wide, is_ball = swept
+    stretches, boxes, starts, solid, wide, kind = swept
     nodes, bounds = room
     best, facet, where = within, warm, 0.0
     if warm >= 0:
-        distance, share = to_stretch(x, stretches[warm], solid, is_ball)
+        distance, share = to_stretch(x, stretches[warm], solid, kind)
         if distance < best:
             best, where = distance, share
             if best <= enough:
                 return best, facet, where
     leaves = len(starts) - 1
-    nodes[0], bounds[0] = 0, _to_box(x, boxes[0]) - wide
+    nodes[0], bounds[0] = 0, _to_box(x, boxes[0], solid, wide, kind)
     count = 1
     while count > 0:
         count -= 1
@@ -160,13 +174,14 @@ def nearest_stretch(
             continue
         leaf = node - (leaves - 1)
         if leaf < 0:
-            near, far = _to_box(x, boxes[2 * node + 1]) - wide, _to_box(x, boxes[2 * node + 2]) - wide
+            near = _to_box(x, boxes[2 * node + 1], solid, wide, kind)
+            far = _to_box(x, boxes[2 * node + 2], solid, wide, kind)
             count = open_node(node, near, far, best, count, nodes, bounds)
         else:
             for k in range(starts[leaf], starts[leaf + 1]):
-                if k == warm or not (is_ball or _may_be_nearer(x, stretches[k], solid, best)):
+                if k == warm or not (kind == BALL or _may_be_nearer(x, stretches[k], solid, best, kind)):
                     continue
-                distance, share = to_stretch(x, stretches[k], solid, is_ball)
+                distance, share = to_stretch(x, stretches[k], solid, kind)
                 if distance < best:
                     best, facet, where = distance, k, share
                     if best <= enough:
