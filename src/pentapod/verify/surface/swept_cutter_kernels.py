@@ -3,7 +3,7 @@
 On each *stretch* of the motion the solid moves straight while its axis turns evenly. The real motion deviates from that
 by at most the bound of the stretch, and the solid is shrunk by this bound. So what counts as removed is removed.
 
-Where the axis never turns, all is in a frame whose z is the axis: a distance takes one root, and boxes bound it closely.
+Where the axis never turns, all is in a frame whose z is that axis: distances take one root, boxes bound them closely.
 """
 
 from __future__ import annotations
