@@ -14,7 +14,7 @@ from pentapod.job.advice.search import advised
 from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, write_arrays, write_json
 from pentapod.job.build.left import FORBIDDEN, foreseen
 from pentapod.job.build.limits import pose_limits, timing_limits
-from pentapod.job.build.other_ways import stands
+from pentapod.job.build.other_ways import ends, may_stand, stands
 from pentapod.job.build.pieces import job_part, job_piece, job_without
 from pentapod.job.build.region import covers_region
 from pentapod.job.build.specification import job_specification
@@ -44,6 +44,9 @@ from pentapod.verify import Claim, Verdict, judged
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
 
 Writer = Callable[[Outcome, Path], object]
+
+FORESEEN = "foreseen"
+"""Name of the stage that refuses a toolpath before it is planned."""
 
 ANOTHER_WAY = "another way"
 """Name of the stage that says in which other way a job is done."""
@@ -75,12 +78,18 @@ def planned(
         specification = dataclasses.replace(specification, setups=max(specification.setups, 2))
     left_out = () if before is None else before.made_from.left_out
     task = Task(job, specification, runner, piece, (*timing_limits(job, machine), *limits), claims, before, left_out)
-    outcome = _foreseen(task, staging, writers) or _planned(task, staging, writers)
     alone = piece is None and before is None and job.placement.setups == 1
+    upright = alone and ends(job) and may_stand(job)
+    outcome = _foreseen(task, staging, writers, upright=upright) or _planned(task, staging, writers)
     if outcome.refusal is not None and alone and covers_region(job):
         outcome = _mended(task, mesh, outcome, staging, writers)
         if not outcome.passed and (other := other_way(job, outcome)) is not None:
             outcome = _otherwise(task, mesh, outcome, *other, staging, writers)
+        if outcome.refusal is not None and outcome.refusal.stage == FORBIDDEN and upright:
+            # Only foreseen so far, and an upright tool does not do it either.
+            task.runner.stages = [stage for stage in task.runner.stages if stage.name != FORESEEN]
+            outcome = _planned(task, staging, writers)
+            outcome = outcome if outcome.passed else _mended(task, mesh, outcome, staging, writers)
     refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
     if refusal is not None and refusal.stage == "placement" and splits:
         outcome = _split(task, mesh, refusal, staging, writers)
@@ -130,15 +139,18 @@ def _toolpath(
     return runner.run("toolpath", made, remark=lambda it: str(it[1]))[0]
 
 
-def _foreseen(task: Task, staging: Path, writers: Mapping[str, Writer]) -> Outcome | None:
-    """Return the outcome of a toolpath whose program would fail its verdict; None where that is not known yet."""
+def _foreseen(task: Task, staging: Path, writers: Mapping[str, Writer], *, upright: bool) -> Outcome | None:
+    """Return the outcome of a toolpath whose program would fail its verdict; None where that is not known yet.
+
+    upright: as for `foreseen`.
+    """
     made = next((stage.value for stage in task.runner.stages if stage.name == "toolpath"), None)
     if made is None or not isinstance(made[1], Reports):  # a piece, or the toolpath of the run before
         return None
-    refusal = foreseen(task.job, made[1], task.toolpath, task.specification.cutting)
+    refusal = foreseen(task.job, made[1], task.toolpath, task.specification.cutting, upright=upright)
     if refusal is None:
         return None
-    task.runner.stages.append(Stage("foreseen", 0.0, refusal))
+    task.runner.stages.append(Stage(FORESEEN, 0.0, refusal))
     return _written(task, refusal_verdict(refusal, task.specification.sources), staging, writers)
 
 

@@ -10,7 +10,8 @@ import concave_parts
 from pentapod.base.errors import MeshError, ProgramError
 from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.cli.commands.new import dome_stl
-from pentapod.job import Job, judge, run
+from pentapod.job import Job, judge, run, stages
+from pentapod.job.build.left import FORBIDDEN, foreseen
 from pentapod.job.build.other_ways import (
     as_made,
     may_stand,
@@ -24,6 +25,7 @@ from pentapod.job.build.other_ways import (
 from pentapod.job.build.pieces import program_toolpath
 from pentapod.job.build.region import rolls
 from pentapod.job.build.specification import job_coverage
+from pentapod.job.build.toolpath import Reports, job_toolpath
 from pentapod.job.build.values import job_mesh
 from pentapod.job.mending import other_way
 from pentapod.job.outcome import Outcome, Stage
@@ -32,6 +34,7 @@ from pentapod.machine.machine import Machine
 from pentapod.mesh.io.stl import write_stl
 from pentapod.program import read_header, write_csv
 from pentapod.toolpath import SegmentKind
+from pentapod.toolpath.gouge.report import GougeReport
 from pentapod.toolpath.surfaces.tip_surface import TipSurface
 from pentapod.verify import Verdict
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
@@ -216,6 +219,42 @@ def test_another_way_that_has_no_surface_leaves_the_first_refusal(job, tmp_path,
     done = run(flat, tmp_path / "out", advice=None)
     assert done.refusal == refusal
     assert not (tmp_path / "out" / "program.csv").exists()
+
+
+def test_an_end_that_leaves_out_much_along_the_normals_is_planned_upright_first(job, tmp_path, monkeypatch):
+    """Where that is refused, too, it is planned along the normals, and this refusal is told."""
+    planned: list[bool] = []
+
+    def refused(self, file):
+        planned.append(stands(self.job))
+        refusal = Refusal("placement", f"no {len(planned)}", (Shortfall("leg 1 too long", ((0, 9000),), 0.2, "mm"),))
+        self.runner.run("placement", lambda: refusal)
+        return refusal
+
+    monkeypatch.setattr(Task, "program", refused)
+    much = GougeReport(motions=3000, gouging=100, depths=(5e-4, 0.0, 0.0), dropped=100, dropped_share=0.19)
+    flat = job.with_(tool={"type": "flat"}, axis={"tilt_deg": None})
+    toolpath = job_toolpath(flat, job_mesh(flat))[0]
+    assert "the tool would cut into the part on 19 %" in str(
+        foreseen(flat, Reports((much,)), toolpath, None, upright=True)
+    )
+    assert foreseen(flat, Reports((much,)), toolpath, None) is None
+    less = replace(much, dropped_share=0.04)
+    assert foreseen(flat, Reports((less,)), toolpath, None, upright=True) is None
+
+    def always(*_, upright=False):
+        return Refusal(FORBIDDEN, "much") if upright else None
+
+    monkeypatch.setattr(stages, "foreseen", always)
+    outcome = run(flat, tmp_path / "out", advice=None)
+    assert planned == [True, False]
+    assert outcome.refusal.cause == "no 2"
+    names = [stage.name for stage in outcome.stages]
+    assert "foreseen" not in names
+    assert names.count(stages.ANOTHER_WAY) == 1
+    planned.clear()
+    run(flat.with_(placement={"setups": 2}), tmp_path / "split", advice=None)
+    assert True not in planned
 
 
 @pytest.mark.slow

@@ -96,23 +96,25 @@ def foreseen(
     toolpath: Toolpath,
     cutting: Cutting | None,
     options: ForesightOptions = ForesightOptions(),
+    *,
+    upright: bool = False,
 ) -> Refusal | None:
     """Return the refusal of a toolpath that leaves out much of what its ball reaches, as shank or holder would gouge.
 
     The ball's own places count as reached, so the verdict would find them missed; other cutters may not reach them.
+    upright: whether the job is one of a bull or flat end that may stand upright instead; that is tried before it is
+    planned with axes along the normals that leave out much.
     """
     for report in reports.parts:
-        if not isinstance(report, GougeReport) or not rolls(job):
+        if not isinstance(report, GougeReport) or not (rolls(job) or upright):
             continue
         most, share = job.tolerance.left_share, 100.0 * report.dropped_share
-        cause = (
-            f"with these tool axes shank or holder would cut into the part on {share:.3g} % of the cuts, "
-            "which are left out"
-        )
+        what = "the tool" if upright else "shank or holder"
+        cause = f"with these tool axes {what} would cut into the part on {share:.3g} % of the cuts, which are left out"
         allowed = f"{100.0 * most:.2g} % of the region may be left"
         if report.dropped_share > options.certain * most:
             return Refusal(FORBIDDEN, f"{cause}; {allowed}")
-        if not report.dropped or cutting is None or not _is_ball(cutting):
+        if upright or not report.dropped or cutting is None or not _is_ball(cutting):
             continue
         missed = missed_by_drops(cutting, toolpath, report.dropped_centres)
         if missed > options.missed * most:
