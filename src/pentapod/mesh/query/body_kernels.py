@@ -13,6 +13,15 @@ AXIS = 3
 VALUE, RATE, RADIUS = range(3, 6)
 """Indices of f, ∂f/∂t and W in what `derivatives` writes."""
 
+NEAR_M = 2e-8
+"""How near the plane of `lowest_on_way` comes to f, metres, unless that takes too many steps."""
+
+ON_WAY = 24
+"""Times that `lowest_on_way` tries at most."""
+
+LEAST_STEP = 0.05
+"""Share of what is left of the times by which each of its steps shortens that at least."""
+
 
 @kernel
 def meridian_distance(solid: Floats, r: float, z: float) -> tuple[float, float, float]:
@@ -81,6 +90,51 @@ def derivatives(solid: Floats, motion: Floats, pose: Floats, x: float, y: float,
     g[2] = scale * rz + by_z * k
     g[VALUE] = f
     _point_moves(motion, wx, wy, wz, g)
+
+
+@kernel
+def lowest_on_way(
+    solid: Floats, motion: Floats, pose: Floats, x: float, y: float, z: float, g: Floats, more: Floats
+) -> tuple[float, float]:
+    """Return the lowest f that is found at a mesh point over a motion whose axis does not turn, and its time.
+
+    Written into g (6,): gradient and value of a plane below f at all points and times. f is convex in both, so that it
+    lies above its tangent planes; those at two times between which it is lowest, weighted so that the mean does not
+    change with time, bound it. more (2, 6): buffers.
+    """
+    late, new = more[0], more[1]
+    pose_at(motion, 0.0, pose)
+    derivatives(solid, motion, pose, x, y, z, g)
+    if motion[15] == 0.0 or g[RATE] >= 0.0:
+        return g[VALUE], 0.0
+    pose_at(motion, 1.0, pose)
+    derivatives(solid, motion, pose, x, y, z, late)
+    if late[RATE] <= 0.0:
+        g[:] = late
+        return g[VALUE], 1.0
+    low, high = 0.0, 1.0
+    best, at = (g[VALUE], low) if g[VALUE] <= late[VALUE] else (late[VALUE], high)
+    share, plane = 0.5, -math.inf
+    for _ in range(ON_WAY):
+        share = late[RATE] / (late[RATE] - g[RATE])
+        plane = share * (g[VALUE] - g[RATE] * low) + (1.0 - share) * (late[VALUE] - late[RATE] * high)
+        if best - plane <= NEAR_M:
+            break
+        t = (late[VALUE] - g[VALUE] + g[RATE] * low - late[RATE] * high) / (g[RATE] - late[RATE])
+        least = LEAST_STEP * (high - low)
+        t = min(max(t, low + least), high - least)
+        pose_at(motion, t, pose)
+        derivatives(solid, motion, pose, x, y, z, new)
+        if new[VALUE] < best:
+            best, at = new[VALUE], t
+        if new[RATE] < 0.0:
+            g[:], low = new, t
+        else:
+            late[:], high = new, t
+    for j in range(3):
+        g[j] = share * g[j] + (1.0 - share) * late[j]
+    g[VALUE] = plane
+    return best, at
 
 
 @kernel

@@ -7,7 +7,15 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.mesh.query.body_kernels import VALUE, above_base, derivatives, deviation_bound, pose_at
+from pentapod.mesh.query.body_kernels import (
+    RATE,
+    VALUE,
+    above_base,
+    derivatives,
+    deviation_bound,
+    lowest_on_way,
+    pose_at,
+)
 from pentapod.numerics.kernels import kernel
 
 STACK = 512
@@ -100,7 +108,7 @@ def _deepest_in_motion(
 
 
 @kernel
-def deepest_at_rest(
+def _deepest_on_way(
     solid: Floats,
     motion: Floats,
     corners: Floats,
@@ -111,38 +119,45 @@ def deepest_at_rest(
     pose: Floats,
     g: Floats,
 ) -> bool:
-    """Lower best (5,): f, time and point, within one facet (3, 3), where the body rests; return whether it did.
+    """Lower best (5,): f, time and point, within one facet (3, 3), where the body does not turn; return whether it did.
 
-    f is convex: its tangent planes at the corners of a piece, and their mean, bound it from below. Pieces are cut
-    across the side along which the slope changes most, about where the slopes say that it is 0: beside a long stem
-    they become long and narrow.
+    The lowest f over the motion is convex: planes below it at the corners of a piece, and their mean, bound it. Pieces
+    are cut across the side along which the slope changes most, about where the slopes say that it is 0: beside a long
+    stem they become long and narrow.
     """
+    more = np.empty((2, 6))
+    if _above_base(solid, motion, pose, corners.ravel(), 3, g) >= _threshold(best, eps):
+        return False
     x = (corners[0, 0] + corners[1, 0] + corners[2, 0]) / 3.0
     y = (corners[0, 1] + corners[1, 1] + corners[2, 1]) / 3.0
     z = (corners[0, 2] + corners[1, 2] + corners[2, 2]) / 3.0
-    derivatives(solid, motion, pose, x, y, z, g)
-    found, lowest = _lowered(best, g, x, y, z), 0.0
+    f, t = lowest_on_way(solid, motion, pose, x, y, z, g, more)
+    found, lowest = _lowered(best, f, t, x, y, z), 0.0
     for i in range(3):
         lowest = min(lowest, g[0] * (corners[i, 0] - x) + g[1] * (corners[i, 1] - y) + g[2] * (corners[i, 2] - z))
     if -best[0] >= enough or g[VALUE] + lowest >= _threshold(best, eps):
         return found
     for i in range(3):
         x, y, z = corners[i, 0], corners[i, 1], corners[i, 2]
-        derivatives(solid, motion, pose, x, y, z, g)
-        found = _lowered(best, g, x, y, z) or found
+        f, t = lowest_on_way(solid, motion, pose, x, y, z, g, more)
+        found = _lowered(best, f, t, x, y, z) or found
         _keep(work[0], 7 * i, g, x, y, z)
     count, cut = 1, work[STACK]
     while count > 0 and -best[0] < enough:
         count -= 1
         piece = work[count]
-        if _least(piece, cut) >= _threshold(best, eps) or count + 2 > STACK:
+        if (
+            _least(piece, cut) >= _threshold(best, eps)
+            or count + 2 > STACK
+            or _above_base(solid, motion, pose, piece, 7, g) >= _threshold(best, eps)
+        ):
             continue
         a, b, share = int(cut[0]), int(cut[1]), cut[2]
         x = piece[a] + share * (piece[b] - piece[a])
         y = piece[a + 1] + share * (piece[b + 1] - piece[a + 1])
         z = piece[a + 2] + share * (piece[b + 2] - piece[a + 2])
-        derivatives(solid, motion, pose, x, y, z, g)
-        found = _lowered(best, g, x, y, z) or found
+        f, t = lowest_on_way(solid, motion, pose, x, y, z, g, more)
+        found = _lowered(best, f, t, x, y, z) or found
         for j in range(WORK):
             work[count + 1, j] = piece[j]
         _keep(work[count], a, g, x, y, z)
@@ -152,17 +167,31 @@ def deepest_at_rest(
 
 
 @kernel
+def _above_base(solid: Floats, motion: Floats, pose: Floats, piece: Floats, each: int, g: Floats) -> float:
+    """Return the lower bound of f on a triangle that the plane gives on which a solid that does not turn stands.
+
+    piece: the corners, `each` numbers apart; g: a buffer. On the motion the plane moves evenly.
+    """
+    pose_at(motion, 0.0, pose)
+    lowest = np.inf
+    for i in range(3):
+        above_base(solid, motion, pose, piece[each * i], piece[each * i + 1], piece[each * i + 2], g)
+        lowest = min(lowest, g[VALUE])
+    return lowest + min(g[RATE], 0.0)
+
+
+@kernel
 def _threshold(best: Floats, eps: float) -> float:
     """Return the lower bound from which on a piece holds nothing that counts as deeper."""
     return best[0] - eps + RELATIVE_ERROR * min(best[0], 0.0)
 
 
 @kernel
-def _lowered(best: Floats, g: Floats, x: float, y: float, z: float) -> bool:
-    """Lower best (5,) to f at a point, where it is lower; return whether it is."""
-    if g[VALUE] >= best[0]:
+def _lowered(best: Floats, f: float, t: float, x: float, y: float, z: float) -> bool:
+    """Lower best (5,) to f at a time and a point, where it is lower; return whether it is."""
+    if f >= best[0]:
         return False
-    best[0], best[1], best[2], best[3], best[4] = g[VALUE], 0.5, x, y, z
+    best[0], best[1], best[2], best[3], best[4] = f, t, x, y, z
     return True
 
 
@@ -214,6 +243,6 @@ def deepest_in_facet(
     g: Floats,
 ) -> bool:
     """Lower best (5,): f, time and point, within one facet (3, 3) and the times s ± tau; return whether it did."""
-    if tau == 0.0:
-        return deepest_at_rest(solid, motion, corners, best, work, eps, enough, pose, g)
+    if motion[16] == 0.0:
+        return _deepest_on_way(solid, motion, corners, best, work, eps, enough, pose, g)
     return _deepest_in_motion(solid, motion, corners, s, tau, best, work, eps, enough, pose, g)

@@ -9,7 +9,8 @@ with centre c and offsets δ, and over the times s ± τ,
 with θ the angle that the axis turns, V the distance that the tilt centre moves, and W the distance of the point from
 the tilt centre: the last two terms bound the deviation of the motion, in the body's frame, from a straight line. The
 body stands on a plane, whose distance bounds f likewise. Boxes and triangles that cannot contain a deeper point than
-the best known are dropped; the others are halved in space or in time, whichever makes the bound worse.
+the best known are dropped; the others are halved in space or in time, whichever makes the bound worse. Where the body
+does not turn, f is convex in space and time together: its lowest value over the motion is, and space alone is halved.
 """
 
 from __future__ import annotations
@@ -17,7 +18,15 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.mesh.query.body_kernels import VALUE, above_base, derivatives, deviation_bound, pose_at
+from pentapod.mesh.query.body_kernels import (
+    RATE,
+    VALUE,
+    above_base,
+    derivatives,
+    deviation_bound,
+    lowest_on_way,
+    pose_at,
+)
 from pentapod.mesh.query.box_kernels import box_radius
 from pentapod.mesh.query.facet_kernels import RELATIVE_ERROR, STACK, WORK, deepest_in_facet
 from pentapod.numerics.kernels import kernel
@@ -26,11 +35,35 @@ from pentapod.numerics.kernels import kernel
 @kernel
 def _above_box(solid: Floats, motion: Floats, pose: Floats, box: Floats, tau: float, g: Floats) -> float:
     """Return the lower bound of f over a box and times that the plane gives on which the solid stands; g: a buffer."""
+    turns = motion[16] != 0.0
+    if not turns:
+        pose_at(motion, 0.0, pose)
     above_base(solid, motion, pose, box[0], box[1], box[2], g)
+    # Of a solid that does not turn the plane moves evenly.
+    off = deviation_bound(motion, g, tau, box_radius(box)) if turns else max(-g[RATE], 0.0)
+    return g[VALUE] - _fall(box, g) - off
+
+
+@kernel
+def _fall(box: Floats, g: Floats) -> float:
+    """Return by how much a plane with gradient g falls from the middle of a box (15,) to its lowest corner."""
     fall = 0.0
     for k in range(3):
         fall += box[3 + k] * abs(g[0] * box[6 + 3 * k] + g[1] * box[7 + 3 * k] + g[2] * box[8 + 3 * k])
-    return g[VALUE] - fall - deviation_bound(motion, g, tau, box_radius(box))
+    return fall
+
+
+@kernel
+def _about_box(
+    solid: Floats, motion: Floats, pose: Floats, box: Floats, s: float, tau: float, g: Floats, more: Floats
+) -> float:
+    """Write into g (6,) a plane below f about the middle of a box (15,); return by how much f may fall below it."""
+    if motion[16] == 0.0:
+        lowest_on_way(solid, motion, pose, box[0], box[1], box[2], g, more)
+        return 0.0
+    pose_at(motion, s, pose)
+    derivatives(solid, motion, pose, box[0], box[1], box[2], g)
+    return float(deviation_bound(motion, g, tau, box_radius(box)))
 
 
 @kernel
@@ -53,21 +86,17 @@ def deepest(
     tilt centre above the tip. best[0] on entry is the threshold: only deeper points are searched. nodes, work: buffers.
     enough: the search ends at a point this deep.
     """
-    pose, g, base = np.empty(6), np.empty(6), np.empty(6)
+    pose, g, base, more = np.empty(6), np.empty(6), np.empty(6), np.empty((2, 6))
     leaves = len(starts) - 1
     facet = -1
-    nodes[0, 0], nodes[0, 1], nodes[0, 2] = 0.0, 0.5, 0.5 if motion[15] > 0.0 or motion[16] > 0.0 else 0.0
+    nodes[0, 0], nodes[0, 1], nodes[0, 2] = 0.0, 0.5, 0.5 if motion[16] > 0.0 else 0.0
     count = 1
     while count > 0:
         count -= 1
         node, s, tau = int(nodes[count, 0]), nodes[count, 1], nodes[count, 2]
         box = boxes[node]
-        pose_at(motion, s, pose)
-        derivatives(solid, motion, pose, box[0], box[1], box[2], g)
-        fall = 0.0
-        for k in range(3):
-            fall += box[3 + k] * abs(g[0] * box[6 + 3 * k] + g[1] * box[7 + 3 * k] + g[2] * box[8 + 3 * k])
-        deviation = deviation_bound(motion, g, tau, box_radius(box))
+        deviation = _about_box(solid, motion, pose, box, s, tau, g, more)
+        fall = _fall(box, g)
         least = best[0] - eps + RELATIVE_ERROR * min(best[0], 0.0)
         if (
             g[VALUE] - fall - deviation >= least

@@ -19,6 +19,9 @@ from pentapod.numerics.threads import for_rows
 RESOLUTION_M = 5e-7
 """Depths are exact to this and one per cent."""
 
+STILL = 1e-9
+"""Radians; an axis that turns by less counts as one that does not: a nanometre at the end of a tool of a metre."""
+
 CHUNK = 5_000
 """Motions between two reports of progress."""
 
@@ -207,8 +210,8 @@ def _motions(start_pose: tuple[Floats, Floats], end_pose: tuple[Floats, Floats],
     # The axis a quarter turn later; between opposite axes any direction will do.
     ahead = axes1 - (axes0 * axes1).sum(axis=1, keepdims=True) * axes0
     length = np.linalg.norm(ahead, axis=1, keepdims=True)
-    ahead = np.where(length > 1e-12, ahead / np.where(length > 1e-12, length, 1.0), tangent_frame(axes0)[0])
-    angle = np.where((length[:, 0] > 1e-12) | (angle > 1.0), angle, 0.0)
+    ahead = np.where(length > STILL, ahead / np.where(length > STILL, length, 1.0), tangent_frame(axes0)[0])
+    angle = np.where((length[:, 0] > STILL) | (angle > 1.0), angle, 0.0)
     spin = angle[:, None] * np.cross(axes0, ahead)
     size = np.linalg.norm(travel, axis=1)
     tall = np.full((len(start), 1), tilt_centre)
