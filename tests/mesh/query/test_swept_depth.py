@@ -179,15 +179,45 @@ def test_depth_of_random_motions_is_at_least_that_of_samples(seed, which):
     assert (found[~seen] <= -0.002 + 2.5e-3).all()
 
 
+@settings(max_examples=24, deadline=None)
+@given(seed=st.integers(0, 100_000), which=st.integers(0, len(TOOLS) - 1))
+def test_a_tool_that_does_not_turn_is_as_deep_as_at_the_best_of_many_places_on_its_way(seed, which):
+    """And as one that turns by a little: that is searched for in another way."""
+    rng, tool = np.random.default_rng(seed), TOOLS[which]
+    tree = tree_of(surfaces.grid(lambda x, y: 3e-3 * np.sin(200 * x) * np.cos(150 * y), width=0.04, cells=20))
+    tips = rng.uniform([-0.02, -0.02, -1e-3], [0.02, 0.02, 8e-3], (2, 3))
+    axis = UP + 0.3 * rng.standard_normal(3)
+    axis /= np.linalg.norm(axis)
+    found = sweep(tree, tool, tips, np.stack([axis, axis]), threshold=-2e-3).depths[0]
+    share = np.linspace(0.0, 1.0, 401)[:, None]
+    places = (1.0 - share) * tips[0] + share * tips[1]
+    at_rest = touch(tree, tool, places, np.tile(axis, (401, 1)), threshold=-2e-3).depths
+    lever = tool.tilt_centre + 0.03
+    turned = axis + 1e-7 * np.cross(axis, UP + 1e-3)
+    other = sweep(tree, tool, tips, np.stack([axis, turned / np.linalg.norm(turned)]), threshold=-2e-3).depths[0]
+    for one, many, more in zip(found, at_rest.max(axis=0), other, strict=True):
+        if np.isfinite(one):
+            slack = 2 * RESOLUTION_M + 0.011 * abs(one)
+            assert one >= many - slack
+            # Between two of these places the tool moves by no more than this.
+            assert one <= many + slack + 0.5 * np.linalg.norm(tips[1] - tips[0]) / 400
+            assert one == pytest.approx(more, abs=slack + 2e-7 * lever)
+
+
 @settings(max_examples=12, deadline=None)
 @given(
-    seed=st.integers(0, 100_000), which=st.integers(0, len(TOOLS) - 1), threshold=st.sampled_from([-5e-4, 0.0, 5e-5])
+    seed=st.integers(0, 100_000),
+    which=st.integers(0, len(TOOLS) - 1),
+    threshold=st.sampled_from([-5e-4, 0.0, 5e-5]),
+    turns=st.booleans(),
 )
-def test_meetings_are_where_the_depth_is_beyond_the_threshold(seed, which, threshold):
+def test_meetings_are_where_the_depth_is_beyond_the_threshold(seed, which, threshold, turns):
     rng = np.random.default_rng(seed)
     tree = tree_of(surfaces.grid(lambda x, y: 3e-3 * np.sin(200 * x) * np.cos(150 * y), width=0.04, cells=20))
     tips = rng.uniform([-0.02, -0.02, -1e-3], [0.02, 0.02, 8e-3], (30, 3))
-    axes = UP + 0.5 * rng.standard_normal((30, 3))
+    tips[20:25] = tips[20]  # at rest
+    axes = UP + 0.5 * rng.standard_normal((30, 3) if turns else 3) * np.ones((30, 1))
+    axes[20:25] = axes[20]
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     tool = TOOLS[which]
     depths = sweep(tree, tool, tips, axes, threshold=threshold - 1e-5).deepest

@@ -135,7 +135,7 @@ def _deepest_on_way(
     found, lowest = _lowered(best, f, t, x, y, z), 0.0
     for i in range(3):
         lowest = min(lowest, g[0] * (corners[i, 0] - x) + g[1] * (corners[i, 1] - y) + g[2] * (corners[i, 2] - z))
-    if -best[0] >= enough or g[VALUE] + lowest >= _threshold(best, eps):
+    if (found and -best[0] >= enough) or g[VALUE] + lowest >= _threshold(best, eps):
         return found
     for i in range(3):
         x, y, z = corners[i, 0], corners[i, 1], corners[i, 2]
@@ -143,7 +143,7 @@ def _deepest_on_way(
         found = _lowered(best, f, t, x, y, z) or found
         _keep(work[0], 7 * i, g, x, y, z)
     count, cut = 1, work[STACK]
-    while count > 0 and -best[0] < enough:
+    while count > 0 and not (found and -best[0] >= enough):
         count -= 1
         piece = work[count]
         if (
