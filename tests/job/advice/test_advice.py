@@ -15,6 +15,7 @@ from pentapod.base.errors import JobError
 from pentapod.base.progress import silent
 from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.cli.main import run as run_cli
+from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import AdviceOptions, Job, advise, run
 from pentapod.job.advice.options import Tried
 from pentapod.job.advice.search import Advised, advised
@@ -23,6 +24,7 @@ from pentapod.job.advice_on_errors import can_help
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.pipeline import tried
+from pentapod.verify.surface.surface_left import SURFACE_LEFT
 from refused_jobs import REFUSED
 
 TOO_FAR = ("position_mm = [", "position_mm = [1000.0, 0, 700] # [")
@@ -117,6 +119,35 @@ def test_where_the_tool_body_touches_an_upright_tool_comes_first(make_job):
         found = advised(*given, short=touch).advice
         upright = [each for each in found if each.toml == "[toolpath]\nunder_mm = 0.0"]
         assert [each.kept for each in upright] == pytest.approx([1.0] if under is None else [])
+
+
+LEFT_ALONE = frozenset((SURFACE_LEFT,))
+
+
+@pytest.mark.parametrize("known", [frozenset(), LEFT_ALONE], ids=["first plan tells", "run tells"])
+def test_axes_that_leave_too_much_are_not_tried_at_other_places(known, tmp_path, monkeypatch):
+    """Wherever the part is, they leave it: other axes are tried, and less of the surface."""
+
+    def plan(job: Job, _) -> Tried:
+        planned.append(job)
+        return Tried("placement", failed=LEFT_ALONE)
+
+    def estimated(_, kinds, *__, **___):
+        return SimpleNamespace(
+            margin=0.2, shortfalls=(), samples=kinds[0], candidate=SimpleNamespace(transform=RigidTransform.identity())
+        )
+
+    monkeypatch.setattr(Settings, "_best", estimated)
+    monkeypatch.setattr(Settings, "beyond_a_single_place", lambda _: ())
+    planned: list[Job] = []
+    job = Job.load(REFUSED["table too low"].write(tmp_path))
+    options = AdviceOptions(plans=5, replans=3)
+    advised(job, job_machine(job), job_mesh(job), None, plan, options, silent, otherwise=known)
+    assert len(planned) == (3 if known else 5)
+    same = [each for each in planned if each.axis == job.axis and each.part == job.part]
+    assert len(same) == (0 if known else 1)
+    axes = [each.axis for each in planned if each.part == job.part and each.tool == job.tool]
+    assert len(axes) == len({str(axis) for axis in axes})
 
 
 @pytest.mark.parametrize(("stage", "split"), [("placement", True), ("verdict", False)])

@@ -88,7 +88,8 @@ def advised(
     found: list[Advice] = []
     tried: dict[str, None] = {}
     reasons: dict[str, None] = {}
-    count, interrupted = options.replans if failed else options.plans, False
+    # A plan that goes back for another way is two.
+    count, interrupted = options.replans if failed or otherwise else options.plans, False
     ended: list[Tried | None] = [None]
     shown = _Shown(progress, count)
     progress("advice", 0.0, "changes of the job are tried; Ctrl-C ends the search")

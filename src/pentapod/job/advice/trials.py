@@ -96,9 +96,10 @@ class Trials:
     def _keeping_all(self, own: bool) -> Iterator[Trial]:
         """Yield changes of tool axes and placement; the cheapest to plan first, once they fit comfortably."""
         for place in self.settings.places:
-            yield from islice(self._in_place(place, own), self.options.failures)
+            for setting in islice(self._in_place(place, own), self.options.failures):
+                yield from self._of_setting(setting)
 
-    def _in_place(self, place: Place, own: bool) -> Iterator[Trial]:
+    def _in_place(self, place: Place, own: bool) -> Iterator[Setting]:
         """Yield other tool axes with one placement; those that fit comfortably as soon as they are found."""
         scant: list[Setting] = []
         for axis in self.settings.of(place):
@@ -111,11 +112,11 @@ class Trials:
             if setting.found.margin < self.options.comfortable:
                 scant.append(setting)
             else:
-                yield from self._of_setting(setting)
+                yield setting
         # Of about the same margin, those count that are cheap to plan.
         for setting in sorted(scant, key=lambda s: -round(s.found.margin, 2)):
             if setting.axis.words not in self._failing:
-                yield from self._of_setting(setting)
+                yield setting
 
     def _of_setting(self, setting: Setting) -> Iterator[Trial]:
         yield Trial(setting.words, setting.changes, 1.0, 1.0)
