@@ -36,6 +36,8 @@ ENTERED_M = 1e-7
 RAY_STEPS = 200
 WAY_Z = 5
 """Index of z in the displacement of a stretch."""
+BOX_TOP = 5
+"""Index of the largest z of a box."""
 
 
 @kernel
@@ -135,7 +137,7 @@ def _may_be_nearer(x: Floats, stretch: Floats, solid: Floats, best: float, kind:
 def _to_box(x: Floats, box: Floats, solid: Floats, wide: float, kind: int) -> float:
     """Return a lower bound of the signed distance of a point from a solid whose axis is in a box (6,)."""
     dx, dy = max(box[0] - x[0], 0.0, x[0] - box[3]), max(box[1] - x[1], 0.0, x[1] - box[4])
-    dz = max(box[2] - x[2], x[2] - box[5])
+    dz = max(box[2] - x[2], x[2] - box[BOX_TOP])
     square = dx * dx + dy * dy
     if kind == FIXED:
         out = math.sqrt(square) - max(solid[2], solid[3])
