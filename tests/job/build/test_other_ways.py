@@ -171,6 +171,19 @@ def test_passes_come_nearer_for_bull_and_flat_ends_and_twice(job):
     assert nearer_share(flat.with_(toolpath={"strategy": "edges", "stepover_mm": None})) is None
 
 
+@pytest.mark.parametrize("key", ["stepover_mm", "scallop_mm"])
+def test_rounding_of_the_distance_makes_no_further_attempt(job, key):
+    """0.3 of 0.7, over 0.7, is not 0.3 in floating-point numbers; nor is the root of its square."""
+    rng = np.random.default_rng(3)
+    for value in rng.uniform(0.01, 5.0, 200):
+        flat = job.with_(**FLAT, toolpath={"stepover_mm": None, "scallop_mm": None, key: float(value)})
+        near = nearer(flat, 0.5)
+        nearest = nearer(near, 0.3)
+        assert nearer_share(near) == 0.3
+        assert nearer_share(nearest) is None
+        assert [nearer_words(each).split(" ")[0] for each in (near, nearest)] == ["second", "third"]
+
+
 def test_the_header_says_how_near_the_passes_are_and_the_toolpath_is_made_so(job, tmp_path):
     flat, program = job.with_(**FLAT), motion(0.1)[0]
     file = write_csv(replace(program, provenance=replace(program.provenance, stepover_share=0.5)), tmp_path / "a.csv")

@@ -26,6 +26,9 @@ from pentapod.verify import Coverage
 NEARER = (0.5, 0.3)
 """Distances between passes, as shares of what is asked for, that are tried where passes come nearer together."""
 
+ROUNDING = 1.0 - 1e-9
+"""Shares that differ by less count as equal."""
+
 ATTEMPTS = ("first", "second", "third", "fourth")
 """How the plans of a run are counted in words."""
 
@@ -78,7 +81,7 @@ def nearer_share(job: Job) -> float | None:
     """
     if not (covers_region(job) and ends(job)):
         return None
-    return next((share for share in NEARER if share < stepover_share(job)), None)
+    return next((share for share in NEARER if share < ROUNDING * stepover_share(job)), None)
 
 
 def ends(job: Job) -> bool:
@@ -95,7 +98,7 @@ def nearer(job: Job, share: float) -> Job:
     table = asked.toolpath.model_dump(include={"stepover_mm", "scallop_mm"}, exclude_none=True)
     # The height of a ridge grows with the square of the distance between passes.
     closer = {key: value * (share if key == "stepover_mm" else share**2) for key, value in table.items()}
-    left = job.tolerance.left_mm or from_si(_allowed_left(asked), "mm")
+    left = job.tolerance.left_mm or from_si(_allowed_left(job), "mm")
     made = job.with_(toolpath=closer, tolerance={"left_mm": left})
     return replace(made, asked=asked, from_file=job.from_file)
 
@@ -103,7 +106,7 @@ def nearer(job: Job, share: float) -> Job:
 def nearer_words(job: Job) -> str:
     """Return what is said of a job that passes nearer together do."""
     share, left = stepover_share(job), f"{job.tolerance.left_mm:.3g} mm"
-    before = stands(job) + sum(each > share for each in NEARER)
+    before = stands(job) + sum(ROUNDING * each > share for each in NEARER)
     passes = f"passes are {share:.2g} times as far apart as asked"
     return f"{ATTEMPTS[1 + before]} attempt: {passes}, because more than {left} would be left between them"
 
