@@ -90,7 +90,7 @@ class SweptSolid:
         (start, end), (first, last), kind = ends, axes, BALL if is_ball else TURNS
         frame: Floats | None = None
         if not is_ball:
-            lever = float(np.hypot(max(abs(low), abs(high)), wide))
+            lever = max(abs(low), abs(high)) + wide  # no point of the solid is farther from its origin
             axis = normalised(first.sum(axis=0) + last.sum(axis=0))
             turn = lever * max(float(np.linalg.norm(each - axis, axis=1).max()) for each in axes)
             if turn <= FIXED_SHARE * near:
