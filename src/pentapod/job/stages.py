@@ -86,10 +86,14 @@ def planned(
         if not outcome.passed and (other := other_way(job, outcome)) is not None:
             outcome = _otherwise(task, mesh, outcome, *other, staging, writers)
         if outcome.refusal is not None and outcome.refusal.stage == FORBIDDEN and upright:
-            # Only foreseen so far, and an upright tool does not do it either.
-            task.runner.stages = [stage for stage in task.runner.stages if stage.name != FORESEEN]
+            # Only foreseen so far, and an upright tool does not do it either: that is told where this fails as well.
+            ways = [stage for stage in task.runner.stages if stage.name == ANOTHER_WAY]
+            task.runner.stages = [s for s in task.runner.stages if s.name not in (FORESEEN, ANOTHER_WAY)]
             outcome = _planned(task, staging, writers)
             outcome = outcome if outcome.passed else _mended(task, mesh, outcome, staging, writers)
+            if not outcome.passed:
+                task.runner.stages += ways
+                outcome = _written(task, outcome.verdict, staging, writers)
     refusal, splits = outcome.refusal, piece is None and job.placement.setups > 1
     if refusal is not None and refusal.stage == "placement" and splits:
         outcome = _split(task, mesh, refusal, staging, writers)

@@ -268,6 +268,19 @@ def test_an_end_that_leaves_out_much_along_the_normals_is_planned_upright_first(
     planned.clear()
     run(flat.with_(placement={"setups": 2}), tmp_path / "split", advice=None)
     assert True not in planned
+    # Where it passes along the normals, nothing of the upright attempt is told.
+    real = stages._planned
+
+    def along_normals(task, *given):
+        if stands(task.job):
+            return real(task, *given)
+        holds = Certificate("all", True, 0.0, 1.0, "", Place(), "")
+        return Outcome(task.job, task.machine, tuple(task.runner.stages), Verdict((holds,)))
+
+    monkeypatch.setattr(stages, "_planned", along_normals)
+    passed = run(flat, tmp_path / "passed", advice=None)
+    assert passed.passed
+    assert [stage.name for stage in passed.stages] == ["mesh", "toolpath"]
 
 
 @pytest.mark.slow
