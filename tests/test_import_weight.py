@@ -62,4 +62,4 @@ def test_a_part_that_cannot_fit_is_refused_before_the_solvers_are_loaded(make_jo
 def test_a_mistyped_key_is_told_before_machine_and_mesh_are_loaded(make_job: Callable[..., Path]) -> None:
     path = make_job(("cut_mm_min", "cut_mm_mim"))
     code = f"from pentapod.cli.main import run\nassert run(['plan', {str(path)!r}]) == 2"
-    assert loaded_after(code, ("pentapod.machine.machine", "pentapod.planning", "pentapod.job.pipeline")) == []
+    assert loaded_after(code, ("pentapod.machine.machine", "pentapod.planning", "pentapod.job.pipeline.run")) == []

@@ -13,12 +13,14 @@ from pentapod.base.errors import InputError, JobError, MeshError, ToolpathError
 from pentapod.base.refusal import Refusal
 from pentapod.cli.commands.new import dome_stl
 from pentapod.geometry import RigidTransform
-from pentapod.job import Job, judge, pipeline, run, stages, task
+from pentapod.job import Job, judge, run, task
 from pentapod.job.artefacts import check_folder
 from pentapod.job.build.placement import job_constraints
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.outcome import SetUps
+from pentapod.job.pipeline import attempt
+from pentapod.job.pipeline import run as pipeline
 from pentapod.job.run_folder import staged
 from pentapod.job.schema.strategies import job_strategies
 from pentapod.planning import LegPath, PlacedPath
@@ -190,7 +192,7 @@ def test_interrupted_runs_change_nothing(stage, error, usual, tmp_path, monkeypa
     def stop(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr(stages if hasattr(stages, stage) else task, stage, stop)
+    monkeypatch.setattr(attempt if hasattr(attempt, stage) else task, stage, stop)
     for folder in (old, fresh):
         with pytest.raises(error):
             run(job, folder)

@@ -13,9 +13,11 @@ from pentapod.base.errors import InputError, JobError
 from pentapod.cli.commands.new import dome_stl
 from pentapod.cli.main import run as command
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.job import Job, run, stages, task
+from pentapod.job import Job, run, task
 from pentapod.job.outcome import SetUps
+from pentapod.job.pipeline import attempt, stages
 from pentapod.machine.machine import Machine
+from pentapod.planning import PlacedPath
 from pentapod.program import read_csv
 from pentapod.report import write_report
 from pentapod.report.sheet import write_sheet
@@ -83,7 +85,7 @@ def test_each_set_up_has_its_files(done):
         assert part.margin > 0.02
         assert part.duration == read_csv(out / part.folder / "program.csv").duration
         assert part.outcome.passed
-    assert len({part.outcome.find(stages.PlacedPath).placement.chosen_by for part in setups.parts}) == 2
+    assert len({part.outcome.find(PlacedPath).placement.chosen_by for part in setups.parts}) == 2
 
 
 def test_each_set_up_is_looked_at_by_itself(done):
@@ -211,7 +213,8 @@ def test_an_interruption_changes_nothing(stage, job, pieces, tmp_path, monkeypat
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(stages if hasattr(stages, stage) else task, stage, stop)
+    home = next(each for each in (stages, attempt, task) if hasattr(each, stage))
+    monkeypatch.setattr(home, stage, stop)
     with pytest.raises(KeyboardInterrupt):
         run(Job.load(job), tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -113,7 +113,7 @@ def _toml(value: Any) -> str:
 class Refusal(Value):
     """Result of a stage that cannot do its task. stage: "placement", "timing", ...; cause: one sentence.
 
-    advice: changes of the job that were planned, and passed, the best first (`job.pipeline.run`). Later stages return
+    advice: changes of the job that were planned, and passed, the best first (`job.run`). Later stages return
     a refusal unchanged, so a chain of stages needs one `unwrap` at its end.
 
     >>> answer = Refusal("timing", "the motion comes to a standstill", remedy="Look at segment 4")

@@ -65,7 +65,7 @@ def _machine_inputs(job: Job, store: Store, machine: Mapping[str, Any] | None) -
 
 def plan_in(folder: Path, job: str) -> Row:
     """Plan and verify a job in its folder, with a report, and return its row."""
-    from pentapod.job.pipeline import run  # noqa: PLC0415  the driver of a batch plans nothing
+    from pentapod.job.pipeline.run import run  # noqa: PLC0415  the driver of a batch plans nothing
     from pentapod.report import write_report  # noqa: PLC0415
 
     try:

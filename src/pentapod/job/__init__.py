@@ -12,18 +12,18 @@ from pentapod.base.registry import imported_when_used
 if TYPE_CHECKING:
     from pentapod.job.advice.options import AdviceOptions as AdviceOptions
     from pentapod.job.advice.search import Advised as Advised
-    from pentapod.job.advice_on_errors import advise as advise
     from pentapod.job.outcome import Outcome as Outcome
-    from pentapod.job.pipeline import run as run
+    from pentapod.job.pipeline.advice_on_errors import advise as advise
+    from pentapod.job.pipeline.run import run as run
     from pentapod.job.schema.job import Job as Job
     from pentapod.job.verdict import judge as judge
 
 _HOMES = {
     "job.advice.options": "AdviceOptions",
     "job.advice.search": "Advised",
-    "job.advice_on_errors": "advise",
+    "job.pipeline.advice_on_errors": "advise",
     "job.outcome": "Outcome",
-    "job.pipeline": "run",
+    "job.pipeline.run": "run",
     "job.schema.job": "Job",
     "job.verdict": "judge",
 }

@@ -14,7 +14,7 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.artefacts import MANIFEST, REPORT, SHEET
 from pentapod.job.build.placement import job_at, placement_toml
 from pentapod.job.outcome import Outcome
-from pentapod.job.pipeline import run as run_job
+from pentapod.job.pipeline.run import run as run_job
 from pentapod.job.run_folder import tidied
 from pentapod.report import write_report
 from pentapod.report.sheet import write_sheet

@@ -20,10 +20,10 @@ from pentapod.job import AdviceOptions, Job, advise, run
 from pentapod.job.advice.options import Tried
 from pentapod.job.advice.search import Advised, advised
 from pentapod.job.advice.settings import Settings
-from pentapod.job.advice_on_errors import can_help
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
-from pentapod.job.pipeline import tried
+from pentapod.job.pipeline.advice_on_errors import can_help
+from pentapod.job.pipeline.run import tried
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
 from refused_jobs import REFUSED
 

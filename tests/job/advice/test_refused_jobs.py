@@ -6,7 +6,7 @@ import pytest
 
 from pentapod.base.errors import InputError
 from pentapod.job import Job, advise, run
-from pentapod.job.advice_on_errors import can_help
+from pentapod.job.pipeline.advice_on_errors import can_help
 from refused_jobs import REFUSED
 
 pytestmark = [pytest.mark.slow, pytest.mark.parts]

@@ -9,9 +9,9 @@ from pentapod.job import Job
 from pentapod.job.advice.options import OPTIONS
 from pentapod.job.advice.starts import starts
 from pentapod.job.advice.wide_parts import check_wide_part
-from pentapod.job.advice_on_errors import can_help
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.job.pipeline.advice_on_errors import can_help
 from refused_jobs import REFUSED
 
 FIRST = {

@@ -10,7 +10,7 @@ import concave_parts
 from pentapod.base.errors import MeshError, ProgramError
 from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.cli.commands.new import dome_stl
-from pentapod.job import Job, judge, run, stages
+from pentapod.job import Job, judge, run
 from pentapod.job.build.left import FORBIDDEN, foreseen
 from pentapod.job.build.other_ways import (
     as_made,
@@ -29,6 +29,8 @@ from pentapod.job.build.toolpath import Reports, job_toolpath
 from pentapod.job.build.values import job_mesh
 from pentapod.job.mending import other_way
 from pentapod.job.outcome import Outcome, Stage
+from pentapod.job.pipeline import attempt
+from pentapod.job.pipeline.other_attempts import ANOTHER_WAY
 from pentapod.job.task import Task
 from pentapod.machine.machine import Machine
 from pentapod.mesh.io.stl import write_stl
@@ -258,26 +260,26 @@ def test_an_end_that_leaves_out_much_along_the_normals_is_planned_upright_first(
     def always(*_, upright=False):
         return Refusal(FORBIDDEN, "much") if upright else None
 
-    monkeypatch.setattr(stages, "foreseen", always)
+    monkeypatch.setattr(attempt, "foreseen", always)
     outcome = run(flat, tmp_path / "out", advice=None)
     assert planned == [True, False]
     assert outcome.refusal.cause == "no 2"
     names = [stage.name for stage in outcome.stages]
     assert "foreseen" not in names
-    assert names.count(stages.ANOTHER_WAY) == 1
+    assert names.count(ANOTHER_WAY) == 1
     planned.clear()
     run(flat.with_(placement={"setups": 2}), tmp_path / "split", advice=None)
     assert True not in planned
     # Where it passes along the normals, nothing of the upright attempt is told.
-    real = stages._planned
+    real = attempt.Attempt.planned
 
-    def along_normals(task, *given):
-        if stands(task.job):
-            return real(task, *given)
+    def along_normals(self):
+        if stands(self.task.job):
+            return real(self)
         holds = Certificate("all", True, 0.0, 1.0, "", Place(), "")
-        return Outcome(task.job, task.machine, tuple(task.runner.stages), Verdict((holds,)))
+        return Outcome(self.task.job, self.task.machine, tuple(self.runner.stages), Verdict((holds,)))
 
-    monkeypatch.setattr(stages, "_planned", along_normals)
+    monkeypatch.setattr(attempt.Attempt, "planned", along_normals)
     passed = run(flat, tmp_path / "passed", advice=None)
     assert passed.passed
     assert [stage.name for stage in passed.stages] == ["mesh", "toolpath"]

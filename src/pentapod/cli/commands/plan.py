@@ -118,9 +118,9 @@ def _planned(path: Path, asked: Asked) -> tuple[int, dict[str, Any] | None]:
     job = changed(Job.load(path), asked.changes, asked.out)
 
     from pentapod.job.advice.options import AdviceOptions
-    from pentapod.job.advice_on_errors import can_help
     from pentapod.job.artefacts import REPORT, SHEET
-    from pentapod.job.pipeline import run
+    from pentapod.job.pipeline.advice_on_errors import can_help
+    from pentapod.job.pipeline.run import run
 
     options = None if asked.advice == 0 else AdviceOptions(wanted=asked.advice or 1)
     if asked.placement is not None:
@@ -205,7 +205,7 @@ def _advised(job: Job, options: AdviceOptions, *, as_json: bool, quiet: bool) ->
     """Search for advice for a job that is an error, print it; return the error's exit code, and what JSON says."""
     from pentapod.base.errors import InputError
     from pentapod.cli.main import EXIT_INPUT
-    from pentapod.job.advice_on_errors import advise
+    from pentapod.job.pipeline.advice_on_errors import advise
 
     try:
         with progress_bar(quiet=quiet or as_json) as progress:

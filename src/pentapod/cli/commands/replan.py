@@ -12,7 +12,7 @@ from pentapod.cli.output import echo_json, json_option, quiet_option
 from pentapod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from pentapod.job.stages import Writer
+    from pentapod.job.pipeline.attempt import Writer
 
 
 @click.command()

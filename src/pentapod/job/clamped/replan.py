@@ -10,10 +10,10 @@ from pentapod.base.progress import Progress, silent
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job.clamped.placed_job import placed_job, read_placement
 from pentapod.job.outcome import Outcome
-from pentapod.job.pipeline import run
+from pentapod.job.pipeline.attempt import Writer
+from pentapod.job.pipeline.run import run
 from pentapod.job.plan_before import PlanBefore
 from pentapod.job.schema.job import Job
-from pentapod.job.stages import Writer
 
 FOLDER = "replanned"
 """Folder of the new run, within that of the run before."""

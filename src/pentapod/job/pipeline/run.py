@@ -23,8 +23,8 @@ from pentapod.machine.machine import Machine
 
 if TYPE_CHECKING:
     from pentapod.job.outcome import Outcome
+    from pentapod.job.pipeline.attempt import Writer
     from pentapod.job.plan_before import PlanBefore
-    from pentapod.job.stages import Writer
     from pentapod.timing import Limit
     from pentapod.toolpath.linking.partition import Piece
     from pentapod.verify import Claim
@@ -68,24 +68,23 @@ def run(
         job = as_made(job, before.made_from)
     runner = StageRunner(progress)
     with staged(folder) as staging:  # from the start: a second run on the folder fails at once
-        used, own_machine = job_machine(job, machine), machine is not None
+        used = job_machine(job, machine)
         mesh = runner.run("mesh", lambda: job_mesh(job, progress), remark=lambda mesh: str(mesh.diagnosis))
         check_reach(job, used, mesh)
         # Slow, and not for a part that cannot fit.
         from pentapod.job.advice.wide_parts import check_wide_part  # noqa: PLC0415
-        from pentapod.job.stages import planned, with_advice  # noqa: PLC0415
+        from pentapod.job.pipeline.stages import planned, with_advice  # noqa: PLC0415
 
         if piece is None and before is None:
             check_wide_part(job, used, mesh)
 
-        rules: Any = {"limits": tuple(limits), "claims": tuple(claims)}
-        files: Any = (staging, writers or {})
-        task, outcome = planned(
-            job, used, mesh, runner, *files, own_machine=own_machine, piece=piece, before=before, **rules
-        )
+        attempt, outcome = planned(
+            job, used, mesh, runner, staging, writers or {}, own_machine=machine is not None,
+            piece=piece, before=before, limits=tuple(limits), claims=tuple(claims),
+        )  # fmt: skip
         if piece is None and advice is not None:
             again = partial(tried, machine=machine, limits=limits, claims=claims)
-            outcome = with_advice(task, mesh, outcome, again, advice, *files)
+            outcome = with_advice(attempt, outcome, again, advice)
     return outcome
 
 

@@ -9,7 +9,7 @@ from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress, silent
 from pentapod.job.advice.options import OPTIONS, AdviceOptions
 from pentapod.job.build.values import job_machine, job_mesh
-from pentapod.job.pipeline import tried
+from pentapod.job.pipeline.run import tried
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
 

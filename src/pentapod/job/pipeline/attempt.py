@@ -1,0 +1,155 @@
+"""Attempt: a job's toolpath planned once, its program judged, its files written."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Self
+
+from pentapod.base.refusal import Refusal
+from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, write_arrays, write_json
+from pentapod.job.build.left import foreseen
+from pentapod.job.build.limits import pose_limits
+from pentapod.job.build.pieces import job_piece
+from pentapod.job.build.toolpath import Reports, job_toolpath
+from pentapod.job.outcome import Outcome, Stage, refusal_verdict
+from pentapod.job.plan_arrays import arrays_of
+from pentapod.job.plan_before import PlanBefore
+from pentapod.job.run_folder import unstaged
+from pentapod.job.schema.job import Job
+from pentapod.job.stage_runner import StageRunner
+from pentapod.job.task import Task
+from pentapod.job.ways.claims import with_ways
+from pentapod.job.ways.ways import remove_ways, ways, write_ways
+from pentapod.job.withheld import withheld
+from pentapod.machine.machine import Machine
+from pentapod.planning import PlacedPath
+from pentapod.program import Program
+from pentapod.toolpath import Mesh, Toolpath
+from pentapod.toolpath.linking.partition import Piece
+from pentapod.verify import Verdict, judged
+
+Writer = Callable[[Outcome, Path], object]
+
+FORESEEN = "foreseen"
+"""Name of the stage that refuses a toolpath before it is planned."""
+
+
+def made_toolpath(
+    job: Job,
+    machine: Machine,
+    mesh: Mesh,
+    runner: StageRunner,
+    piece: Piece | None = None,
+    before: PlanBefore | None = None,
+) -> Toolpath:
+    """Return the job's toolpath, or a piece of it, as a stage of the run."""
+
+    def made() -> tuple[Toolpath, object]:
+        if before is not None:
+            return before.toolpath, "toolpath of the run before"
+        if piece is None:
+            return job_toolpath(job, mesh, runner.progress, machine=machine)
+        return job_piece(job, mesh, piece, runner.progress, machine=machine), piece
+
+    return runner.run("toolpath", made, remark=lambda it: str(it[1]))[0]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Attempt:
+    """A plan of a job in one way.
+
+    mesh: of the job's part. staging: the folder for its files. writers: further files, by name.
+    """
+
+    task: Task
+    mesh: Mesh
+    staging: Path
+    writers: Mapping[str, Writer]
+
+    @property
+    def runner(self) -> StageRunner:
+        """What runs the stages of the attempt."""
+        return self.task.runner
+
+    def of(self, **changes: Any) -> Self:
+        """Return the attempt at a task with some fields changed."""
+        return dataclasses.replace(self, task=dataclasses.replace(self.task, **changes))
+
+    def foreseen(self, *, upright: bool) -> Outcome | None:
+        """Return the outcome of a toolpath whose program would fail its verdict; None where that is not known yet.
+
+        upright: as for `build.left.foreseen`.
+        """
+        task = self.task
+        made = next((stage.value for stage in self.runner.stages if stage.name == "toolpath"), None)
+        if made is None or not isinstance(made[1], Reports):  # a piece, or the toolpath of the run before
+            return None
+        refusal = foreseen(task.job, made[1], task.toolpath, task.specification.cutting, upright=upright)
+        if refusal is None:
+            return None
+        self.runner.stages.append(Stage(FORESEEN, 0.0, refusal))
+        return self.refused(refusal)
+
+    def planned(self) -> Outcome:
+        """Run the stages after the toolpath and the verification, write the files, and return the outcome."""
+        file, runner = self.staging / PROGRAM, self.runner
+        (self.staging / WITHHELD).unlink(missing_ok=True)
+        program = self.task.program(file)
+        refused = program if isinstance(program, Refusal) else self._with_ways(program)
+        if refused is not None:
+            file.unlink(missing_ok=True)
+            return self.refused(refused)
+        specification, claims = with_ways(self.task.specification, self.staging)
+        claims = (*claims, *self.task.claims)
+        verdict = runner.run("verify", lambda: judged(file, specification, claims=claims, progress=runner.progress))
+        if (fails := withheld(verdict)) is not None:
+            runner.stages.append(Stage("withheld", 0.0, fails))
+            file.rename(self.staging / WITHHELD)
+            remove_ways(self.staging)
+        return self.written(verdict)
+
+    def refused(self, refusal: Refusal) -> Outcome:
+        """Write the files of a refused run, and return the outcome."""
+        return self.written(refusal_verdict(refusal, self.task.specification.sources))
+
+    def written(self, verdict: Verdict) -> Outcome:
+        """Write the files of a run but its program, and return the outcome."""
+        task, staging = self.task, self.staging
+        outcome = Outcome(task.job.asked or task.job, task.machine, tuple(self.runner.stages), verdict)
+        if (placed := outcome.find(PlacedPath)) is not None:
+            outcome = dataclasses.replace(outcome, machine=task.on(placed.placement).machine)
+        write_arrays(arrays_of(outcome, unstaged(staging)), staging / ARRAYS)
+        for name, write in self.writers.items():
+            self.runner.progress("report", 0.0, name)
+            write(outcome, staging / name)
+        write_json(outcome.to_dict(), staging / VERDICT)
+        return outcome
+
+    def withheld(self) -> bytes | None:
+        """Return the program that failed its verdict; None where none was written."""
+        file = self.staging / WITHHELD
+        return file.read_bytes() if file.is_file() else None
+
+    def put_back(self, failed: Outcome, program: bytes | None) -> Outcome:
+        """Write the files of a failed run again, and its program that was withheld; return the outcome."""
+        file = self.staging / WITHHELD
+        file.unlink(missing_ok=True)
+        if program is not None:
+            file.write_bytes(program)
+        return self.written(failed.verdict)
+
+    def _with_ways(self, program: Program) -> Refusal | None:
+        """Make the ways of a program and write them beside it, if the machine has a park pose; or return a refusal."""
+        remove_ways(self.staging)
+        task = self.task
+        if task.machine.park.pose is None:
+            return None
+        machine = program.machine(task.machine)
+        specification, kinds = dataclasses.replace(task.specification, machine=machine), pose_limits(task.job)
+        made = self.runner.run("ways", lambda: ways(program, specification, limits=task.limits, kinds=kinds))
+        if isinstance(made, Refusal):
+            return made
+        write_ways(made, self.staging)
+        return None

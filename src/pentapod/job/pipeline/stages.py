@@ -1,0 +1,117 @@
+"""Stages of a job whose mesh was read: plan and verdict, other attempts, set-ups, advice."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from pentapod.base.refusal import Refusal
+from pentapod.job.advice.options import AdviceOptions, Tried
+from pentapod.job.advice.search import advised
+from pentapod.job.build.left import FORBIDDEN
+from pentapod.job.build.limits import timing_limits
+from pentapod.job.build.pieces import job_part
+from pentapod.job.build.region import covers_region
+from pentapod.job.build.specification import job_specification
+from pentapod.job.build.toolpath import job_link_style
+from pentapod.job.mending import FailedWay
+from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage
+from pentapod.job.pipeline.attempt import Attempt, Writer, made_toolpath
+from pentapod.job.pipeline.other_attempts import first_attempts
+from pentapod.job.plan_before import PlanBefore
+from pentapod.job.schema.job import Job
+from pentapod.job.stage_runner import StageRunner
+from pentapod.job.task import Task
+from pentapod.job.ways.names import FILES
+from pentapod.job.withheld import STAGE, failures
+from pentapod.machine.machine import Machine
+from pentapod.planning.setups import setups
+from pentapod.timing import Limit
+from pentapod.toolpath import Mesh
+from pentapod.toolpath.linking.partition import Piece, missed_cuts
+from pentapod.verify import Claim
+
+
+def planned(
+    job: Job,
+    machine: Machine,
+    mesh: Mesh,
+    runner: StageRunner,
+    staging: Path,
+    writers: Mapping[str, Writer],
+    *,
+    own_machine: bool,
+    piece: Piece | None,
+    before: PlanBefore | None,
+    limits: tuple[Limit, ...],
+    claims: tuple[Claim, ...],
+) -> tuple[Attempt, Outcome]:
+    """Plan a job whose mesh was read, write the files into `staging`, and return the attempt and its outcome.
+
+    machine, mesh: those of the job. own_machine: whether the machine is a value of the caller, of no file. Else as in
+    `pipeline.run`. Raises InputError.
+    """
+    specification = job_specification(
+        job, machine, mesh, lambda: made_toolpath(job, machine, mesh, runner, piece, before), own_machine=own_machine
+    )
+    if piece is not None:  # the caller plans the other pieces elsewhere
+        specification = dataclasses.replace(specification, setups=max(specification.setups, 2))
+    left_out = () if before is None else before.made_from.left_out
+    task = Task(job, specification, runner, piece, (*timing_limits(job, machine), *limits), claims, before, left_out)
+    attempt = Attempt(task, mesh, staging, writers)
+    alone = piece is None and before is None and job.placement.setups == 1
+    if alone and covers_region(job):
+        return attempt, first_attempts(attempt)
+    outcome = attempt.foreseen(upright=False) or attempt.planned()
+    refusal = outcome.refusal
+    if refusal is not None and refusal.stage == "placement" and piece is None and job.placement.setups > 1:
+        outcome = _split(attempt, refusal)
+    return attempt, outcome
+
+
+def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried], options: AdviceOptions) -> Outcome:
+    """Search for changes with which a refused job is planned, and return the outcome whose refusal holds them.
+
+    again: plans a job and returns how that ends, as `pipeline.tried`.
+    """
+    refusal, task, runner = outcome.refusal, attempt.task, attempt.runner
+    if refusal is None or refusal.stage in FILES:  # a way is refused by the machine's file, not by the job
+        return outcome
+    search = (task.job, task.machine, attempt.mesh, task.toolpath, again, options, runner.progress)
+    failed = failures(outcome.verdict) if refusal.stage == STAGE else {}
+    forbidden = refusal.stage == FORBIDDEN
+    otherwise = outcome.find(FailedWay)
+    own = frozenset[str]() if otherwise is None else otherwise.claims
+    found = runner.run("advice", lambda: advised(*search, failed, refusal.diagnosis, own, forbidden=forbidden))
+    better = refusal.with_advice(found.advice, found.sentence)
+    runner.stages = [s if s.value is not refusal else s.with_value(better) for s in runner.stages]
+    return attempt.written(outcome.verdict) if failed else attempt.refused(better)
+
+
+def _split(attempt: Attempt, refusal: Refusal) -> Outcome:
+    """Split a job that one placement cannot reach into set-ups, each in a folder of its own; or refuse it."""
+    task, runner, staging = attempt.task, attempt.runner, attempt.staging
+    job, mesh, toolpath = task.job, attempt.mesh, task.toolpath
+    # The refusal is not part of the outcome.
+    runner.stages = [stage for stage in runner.stages if stage.value is not refusal]
+    style = job_link_style(job, mesh, toolpath)
+    search = (toolpath, task.fits, style, job.placement.setups, refusal, runner.progress)
+    found = runner.run("set-ups", lambda: setups(*search))
+    if isinstance(found, Refusal):
+        return attempt.refused(found)
+    cutting, missed = missed_cuts(toolpath, found)
+    parts: list[SetUp] = []
+    before = [stage for stage in runner.stages if stage.name not in ("toolpath", "set-ups")]
+    for number, piece in enumerate(found, start=1):
+        runner.progress("set-ups", (number - 1) / len(found), f"planning {number} of {len(found)}")
+        own, part = StageRunner(runner.progress), job_part(job, mesh, toolpath, piece, machine=task.machine)
+        own.stages += [*before, Stage("toolpath", 0.0, (part, piece), f"set-up {number} of {len(found)}: {piece}")]
+        folder = staging / SetUp.folder_of(number)
+        folder.mkdir()
+        specification = dataclasses.replace(task.specification, toolpath=part, missed=missed)
+        own_attempt = attempt.of(specification=specification, runner=own, piece=piece)
+        parts.append(SetUp(number, piece, dataclasses.replace(own_attempt, staging=folder).planned()))
+    done = SetUps(tuple(parts), cutting, missed, job.placement.setups)
+    runner.stages.append(Stage("set-ups planned", sum(part.seconds for part in parts), done, str(done)))
+    return attempt.written(done.verdict)
