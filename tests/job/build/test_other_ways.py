@@ -158,7 +158,7 @@ def test_ridges_of_a_quarter_of_the_height_are_half_as_far_apart(job):
     assert stepover_share(made) == pytest.approx(0.5)
 
 
-def test_passes_come_nearer_for_bull_and_flat_ends_and_twice(job):
+def test_passes_come_nearer_twice(job):
     flat = job.with_(**FLAT)
     assert nearer_share(flat) == 0.5
     near = nearer(flat, 0.5)
@@ -169,7 +169,7 @@ def test_passes_come_nearer_for_bull_and_flat_ends_and_twice(job):
     assert nearest.tolerance.left_mm == near.tolerance.left_mm
     assert nearest.digest == flat.digest
     assert [nearer_words(each).split(" ")[0] for each in (near, nearest)] == ["second", "third"]
-    assert nearer_share(job) is None
+    assert nearer_share(job) == 0.5
     assert nearer_share(flat.with_(toolpath={"strategy": "edges", "stepover_mm": None})) is None
 
 
@@ -195,7 +195,8 @@ def test_the_header_says_how_near_the_passes_are_and_the_toolpath_is_made_so(job
     cuts = [sum(segment.kind is SegmentKind.CUT for segment in path.segments) for path in (near, far)]
     assert cuts[0] > 1.5 * cuts[1]
     # A header that says so of a job that does not do it changes nothing.
-    assert len(program_toolpath(job, job_mesh(job), file)) == len(program_toolpath(job, job_mesh(job), plain))
+    edges = flat.with_(toolpath={"strategy": "edges", "stepover_mm": None})
+    assert as_made(edges, replace(program.provenance, stepover_share=0.5)) is edges
 
 
 def failing(job, *claims, limits=(), left=2.0):
@@ -219,6 +220,7 @@ def test_what_fails_decides_on_the_other_way(job):
     assert other_way(last, failing(last, SURFACE_LEFT, left=0.2), failing(made, SURFACE_LEFT)) is None
     assert stands(other_way(flat, failing(flat, limits=("leg 1 too long",)))[0])
     assert other_way(job, failing(job, SURFACE_LEFT)) is None
+    assert stepover_share(other_way(job, failing(job, SURFACE_LEFT, left=0.9))[0]) == 0.5
     assert stands(other_way(job, failing(job, limits=("tool body touches the part",)))[0])
 
 

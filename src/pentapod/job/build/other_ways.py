@@ -5,7 +5,8 @@ smooth lean keeps a ball clear, and for concave ones, where bull and flat ends c
 a tool does not reach is left: the verdict tells how much of it a leaning tool might reach.
 
 On slopes bull and flat ends leave stairs between passes that are higher than the ridges of a plane, by which the bound
-of what may be left is chosen: passes nearer together keep that bound.
+of what may be left is chosen: passes nearer together keep that bound. A ball may leave a little too much where passes
+end under what leans over them.
 """
 
 from __future__ import annotations
@@ -22,9 +23,13 @@ from pentapod.job.schema.job import Job
 from pentapod.program.program import Provenance
 from pentapod.toolpath.strategies.registry import STRATEGIES
 from pentapod.verify import Coverage
+from pentapod.verify.verdict.verdict import Certificate
 
 NEARER = (0.5, 0.3)
 """Distances between passes, as shares of what is asked for, that are tried where passes come nearer together."""
+
+LITTLE = 10.0
+"""A ball's passes come nearer if no more is left than this multiple of what may be left; more lies elsewhere."""
 
 ROUNDING = 1.0 - 1e-9
 """Shares that differ by less count as equal."""
@@ -77,11 +82,16 @@ def stands(job: Job) -> bool:
 def nearer_share(job: Job) -> float | None:
     """Return the next share of the asked distance between passes that may do a job; None where none is left.
 
-    Only where a bull or flat end covers a region.
+    Only where the tool covers a region.
     """
-    if not (covers_region(job) and ends(job)):
+    if not covers_region(job):
         return None
     return next((share for share in NEARER if share < ROUNDING * stepover_share(job)), None)
+
+
+def nearer_helps(job: Job, left: Certificate) -> bool:
+    """Return whether passes nearer together may do a job whose only failing claim is about what is left."""
+    return nearer_share(job) is not None and (ends(job) or (left.value or 0.0) <= LITTLE * (left.bound or 0.0))
 
 
 def ends(job: Job) -> bool:
