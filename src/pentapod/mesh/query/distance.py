@@ -140,21 +140,13 @@ class MeshDistance:
         Lower bounds, exact to TOOL_RESOLUTION_M outside and 1 % more inside; negative where a mesh point lies inside
         the tool. They are capped at `within`; the point is NaN there.
         """
-        low, high = min(s.low - s.rounding for s in solids), max(s.top for s in solids)
-        wide = max(max(s.low_radius, s.high_radius) + s.rounding for s in solids)
-        reach = within + wide
-        gap, point = np.full(len(tips), within), np.full((len(tips), 3), np.nan)
-        # The cylinder around the tool shows that most tools are far away.
-        near = np.flatnonzero(self._nearest(tips + low * axes, (high - low) * axes, reach)[0] < reach)
         body = TouchingBody(tuple(solids))
-        touched = touch(self.tree, body, tips[near], axes[near], threshold=-within, resolution=TOOL_RESOLUTION_M)
-        kind, rows = touched.depths.argmax(axis=1), np.arange(len(near))
+        touched = touch(self.tree, body, tips, axes, threshold=-within, resolution=TOOL_RESOLUTION_M)
+        kind, rows = touched.depths.argmax(axis=1), np.arange(len(tips))
         found = -touched.depths[rows, kind]
-        seen = np.isfinite(found)
-        found = np.where(seen, found, within + TOOL_RESOLUTION_M)
-        gap[near] = np.minimum(found - TOOL_RESOLUTION_M + 0.01 * np.minimum(found, 0.0), within)
-        point[near] = touched.points[rows, kind]
-        return gap, point
+        found = np.where(np.isfinite(found), found, within + TOOL_RESOLUTION_M)
+        gap = np.minimum(found - TOOL_RESOLUTION_M + 0.01 * np.minimum(found, 0.0), within)
+        return gap, touched.points[rows, kind]
 
     def contains(self, points: ArrayLike) -> Bools:
         """Return which points (M, 3) a closed mesh encloses, by winding numbers; slow for many points."""

@@ -16,6 +16,7 @@ from pentapod.mesh.query.body_kernels import (
     lowest_on_way,
     pose_at,
 )
+from pentapod.mesh.query.rest_kernels import into_frame, lowest_on_facet, told_at_once
 from pentapod.numerics.kernels import kernel
 
 STACK = 512
@@ -80,9 +81,9 @@ def _deepest_in_motion(
             lowest = min(lowest, g[0] * dx + g[1] * dy + g[2] * dz)
             size = max(size, dx * dx + dy * dy + dz * dz)
         deviation = deviation_bound(motion, g, tau, math.sqrt(size))
-        if g[VALUE] + lowest - deviation >= _threshold(best, eps) or count + 2 > STACK:
+        if g[VALUE] + lowest - deviation >= counts_below(best, eps) or count + 2 > STACK:
             continue
-        if _above_piece(solid, motion, pose, work[count], tau, base) >= _threshold(best, eps):
+        if _above_piece(solid, motion, pose, work[count], tau, base) >= counts_below(best, eps):
             continue
         if deviation > -lowest:
             for half in range(2):
@@ -126,7 +127,7 @@ def _deepest_on_way(
     stem they become long and narrow.
     """
     more = np.empty((2, 6))
-    if _above_base(solid, motion, pose, corners.ravel(), 3, g) >= _threshold(best, eps):
+    if _above_base(solid, motion, pose, corners.ravel(), 3, g) >= counts_below(best, eps):
         return False
     x = (corners[0, 0] + corners[1, 0] + corners[2, 0]) / 3.0
     y = (corners[0, 1] + corners[1, 1] + corners[2, 1]) / 3.0
@@ -135,7 +136,7 @@ def _deepest_on_way(
     found, lowest = _lowered(best, f, t, x, y, z), 0.0
     for i in range(3):
         lowest = min(lowest, g[0] * (corners[i, 0] - x) + g[1] * (corners[i, 1] - y) + g[2] * (corners[i, 2] - z))
-    if (found and -best[0] >= enough) or g[VALUE] + lowest >= _threshold(best, eps):
+    if (found and -best[0] >= enough) or g[VALUE] + lowest >= counts_below(best, eps):
         return found
     for i in range(3):
         x, y, z = corners[i, 0], corners[i, 1], corners[i, 2]
@@ -147,9 +148,9 @@ def _deepest_on_way(
         count -= 1
         piece = work[count]
         if (
-            _least(piece, cut) >= _threshold(best, eps)
+            _least(piece, cut) >= counts_below(best, eps)
             or count + 2 > STACK
-            or _above_base(solid, motion, pose, piece, 7, g) >= _threshold(best, eps)
+            or _above_base(solid, motion, pose, piece, 7, g) >= counts_below(best, eps)
         ):
             continue
         a, b, share = int(cut[0]), int(cut[1]), cut[2]
@@ -181,7 +182,7 @@ def _above_base(solid: Floats, motion: Floats, pose: Floats, piece: Floats, each
 
 
 @kernel
-def _threshold(best: Floats, eps: float) -> float:
+def counts_below(best: Floats, eps: float) -> float:
     """Return the lower bound from which on a piece holds nothing that counts as deeper."""
     return best[0] - eps + RELATIVE_ERROR * min(best[0], 0.0)
 
@@ -229,6 +230,35 @@ def _least(piece: Floats, cut: Floats) -> float:
 
 
 @kernel
+def deepest_in_facet_at_rest(
+    solid: Floats,
+    motion: Floats,
+    corners: Floats,
+    best: Floats,
+    work: Floats,
+    eps: float,
+    enough: float,
+    pose: Floats,
+    g: Floats,
+) -> bool:
+    """Lower best (5,): f, time and point, within one facet (3, 3), where the body rests; return whether it did."""
+    own, lowest = work[0, :9].reshape(3, 3), work[0, 9:13]
+    into_frame(motion, corners, own)
+    bound = told_at_once(solid, own, lowest)
+    if bound >= counts_below(best, eps):
+        return False
+    if bound < lowest[0] - eps:
+        bound = max(bound, lowest_on_facet(solid, own, lowest, counts_below(best, eps), eps))
+    x = lowest[1] * corners[0, 0] + lowest[2] * corners[1, 0] + lowest[3] * corners[2, 0]
+    y = lowest[1] * corners[0, 1] + lowest[2] * corners[1, 1] + lowest[3] * corners[2, 1]
+    z = lowest[1] * corners[0, 2] + lowest[2] * corners[1, 2] + lowest[3] * corners[2, 2]
+    found = _lowered(best, lowest[0], 0.0, x, y, z)
+    if (found and -best[0] >= enough) or bound >= counts_below(best, eps):
+        return found
+    return _deepest_on_way(solid, motion, corners, best, work, eps, enough, pose, g) or found
+
+
+@kernel
 def deepest_in_facet(
     solid: Floats,
     motion: Floats,
@@ -243,6 +273,6 @@ def deepest_in_facet(
     g: Floats,
 ) -> bool:
     """Lower best (5,): f, time and point, within one facet (3, 3) and the times s ± tau; return whether it did."""
-    if motion[16] == 0.0:
-        return _deepest_on_way(solid, motion, corners, best, work, eps, enough, pose, g)
-    return _deepest_in_motion(solid, motion, corners, s, tau, best, work, eps, enough, pose, g)
+    if motion[16] != 0.0:
+        return _deepest_in_motion(solid, motion, corners, s, tau, best, work, eps, enough, pose, g)
+    return _deepest_on_way(solid, motion, corners, best, work, eps, enough, pose, g)

@@ -28,7 +28,14 @@ from pentapod.mesh.query.body_kernels import (
     pose_at,
 )
 from pentapod.mesh.query.box_kernels import box_radius
-from pentapod.mesh.query.facet_kernels import RELATIVE_ERROR, STACK, WORK, deepest_in_facet
+from pentapod.mesh.query.facet_kernels import (
+    RELATIVE_ERROR,
+    STACK,
+    WORK,
+    counts_below,
+    deepest_in_facet,
+    deepest_in_facet_at_rest,
+)
 from pentapod.numerics.kernels import kernel
 
 
@@ -130,6 +137,55 @@ def deepest(
 
 
 @kernel
+def deepest_at_rest(
+    solid: Floats,
+    motion: Floats,
+    corners: Floats,
+    boxes: Floats,
+    starts: Ints,
+    best: Floats,
+    nodes: Floats,
+    work: Floats,
+    eps: float,
+    enough: float,
+) -> int:
+    """As `deepest`, of a solid that neither moves nor turns."""
+    pose, g = np.empty(6), np.empty(6)
+    leaves = len(starts) - 1
+    facet = -1
+    nodes[0, 0] = 0.0
+    pose_at(motion, 0.0, pose)
+    count = 1
+    while count > 0:
+        count -= 1
+        node = int(nodes[count, 0])
+        box = boxes[node]
+        least = counts_below(best, eps)
+        above_base(solid, motion, pose, box[0], box[1], box[2], g)
+        if g[VALUE] - _fall(box, g) >= least or count + 2 > STACK:
+            continue
+        derivatives(solid, motion, pose, box[0], box[1], box[2], g)
+        if g[VALUE] - _fall(box, g) >= least:
+            continue
+        leaf = node - (leaves - 1)
+        if leaf < 0:
+            # Search the child with the deeper centre first: its result prunes the other.
+            left, right = 2 * node + 1, 2 * node + 2
+            ahead = 0.0
+            for k in range(3):
+                ahead += g[k] * (boxes[left, k] - boxes[right, k])
+            nodes[count, 0], nodes[count + 1, 0] = (right, left) if ahead < 0.0 else (left, right)
+            count += 2
+            continue
+        for k in range(starts[leaf], starts[leaf + 1]):
+            if deepest_in_facet_at_rest(solid, motion, corners[k], best, work, eps, enough, pose, g):
+                facet = k
+                if -best[0] >= enough:
+                    return facet
+    return facet
+
+
+@kernel
 def sweep_all(
     solid: Floats,
     motions: Floats,
@@ -148,9 +204,19 @@ def sweep_all(
     enough: a depth beyond which no deeper point is searched.
     """
     nodes, work, best = np.empty((STACK, 3)), np.empty((STACK + 1, WORK)), np.empty(2 + 3)
+    pose, g = np.empty(6), np.empty(6)
     for m in range(len(motions)):
         best[0] = -threshold
-        facets[m] = deepest(solid, motions[m], corners, boxes, starts, best, nodes, work, eps, enough)
+        if motions[m, 15] > 0.0 or motions[m, 16] > 0.0:
+            facets[m] = deepest(solid, motions[m], corners, boxes, starts, best, nodes, work, eps, enough)
+        else:
+            last = facets[m - 1] if m > 0 else -1
+            found = last >= 0 and deepest_in_facet_at_rest(
+                solid, motions[m], corners[last], best, work, eps, enough, pose, g
+            )
+            facets[m] = deepest_at_rest(solid, motions[m], corners, boxes, starts, best, nodes, work, eps, enough)
+            if found and facets[m] < 0:
+                facets[m] = last
         if facets[m] >= 0:
             depths[m] = -best[0]
             for j in range(4):

@@ -1,0 +1,197 @@
+"""Deepest point of one facet in a solid of revolution at rest; compiled.
+
+f, the signed distance of a point from the solid, is convex. So it is lowest on the facet either where it is lowest on
+the whole plane of the facet, if the facet holds that point, or on a side of the facet beyond which that point lies. The
+first is the point of the plane that is nearest to the solid; along a side two tangents bound f from below.
+"""
+
+from __future__ import annotations
+
+import math
+
+from pentapod.base.arrays import Floats
+from pentapod.mesh.query.body_kernels import meridian_distance
+from pentapod.numerics.kernels import kernel
+
+STEPS = 24
+"""Times that are tried at most along a side of a facet."""
+
+LEAST_STEP = 0.05
+"""Share of what is left of a side by which each step shortens that at least."""
+
+ALIKE = 1e-9
+"""Metres by which two supports of a solid differ at least, so that one of them is its nearest point to a plane."""
+
+
+@kernel
+def into_frame(motion: Floats, corners: Floats, own: Floats) -> None:
+    """Write the corners (3, 3) of a facet into own (3, 3), in the frame of a solid at rest: its tip and its axis, z."""
+    for k in range(3):
+        x, y, z = corners[k, 0] - motion[0], corners[k, 1] - motion[1], corners[k, 2] - motion[2]
+        own[k, 0] = x * motion[9] + y * motion[10] + z * motion[11]
+        own[k, 1] = (
+            x * (motion[4] * motion[11] - motion[5] * motion[10])
+            + y * (motion[5] * motion[9] - motion[3] * motion[11])
+            + z * (motion[3] * motion[10] - motion[4] * motion[9])
+        )
+        own[k, 2] = x * motion[3] + y * motion[4] + z * motion[5] + motion[17]
+
+
+@kernel
+def nearest_to_axis(own: Floats, lowest: Floats) -> float:
+    """Write into lowest (4,), from index 1, the weights of the facet's nearest point to the axis; return how far it is.
+
+    own (3, 3): corners in the frame of the solid.
+    """
+    inwards = 0
+    for k in range(3):
+        a, b = own[k], own[(k + 1) % 3]
+        turn = a[0] * b[1] - a[1] * b[0]
+        lowest[1 + (k + 2) % 3] = turn
+        inwards += 1 if turn > 0.0 else -1 if turn < 0.0 else 0
+    if abs(inwards) == 3:
+        total = lowest[1] + lowest[2] + lowest[3]
+        for k in range(3):
+            lowest[1 + k] /= total
+        return 0.0
+    best, at, share = math.inf, 0, 0.0
+    for k in range(3):
+        a, b = own[k], own[(k + 1) % 3]
+        dx, dy = b[0] - a[0], b[1] - a[1]
+        square = dx * dx + dy * dy
+        t = min(max(-(a[0] * dx + a[1] * dy) / square, 0.0), 1.0) if square > 0.0 else 0.0
+        off = (a[0] + t * dx) ** 2 + (a[1] + t * dy) ** 2
+        if off < best:
+            best, at, share = off, k, t
+    lowest[1 + at], lowest[1 + (at + 1) % 3], lowest[1 + (at + 2) % 3] = 1.0 - share, share, 0.0
+    return math.sqrt(best)
+
+
+@kernel
+def told_at_once(solid: Floats, own: Floats, lowest: Floats) -> float:
+    """Return a lower bound of f on a facet (3, 3) in the solid's frame: by its nearest point to the axis, and heights.
+
+    lowest (4,): filled with the lower f of that point and of the highest and lowest corners, and weights of corners.
+    """
+    off = nearest_to_axis(own, lowest)
+    height = lowest[1] * own[0, 2] + lowest[2] * own[1, 2] + lowest[3] * own[2, 2]
+    lowest[0] = meridian_distance(solid, off, height)[0]
+    top = max(own[0, 2], own[1, 2], own[2, 2])
+    bottom = min(own[0, 2], own[1, 2], own[2, 2])
+    for k in range(3):
+        if own[k, 2] == top or own[k, 2] == bottom:
+            value = meridian_distance(solid, math.sqrt(own[k, 0] ** 2 + own[k, 1] ** 2), own[k, 2])[0]
+            if value < lowest[0]:
+                lowest[0], lowest[1], lowest[2], lowest[3] = value, 0.0, 0.0, 0.0
+                lowest[1 + k] = 1.0
+    return max(off - max(solid[2], solid[3]), solid[0] - top, bottom - solid[1]) - solid[4]
+
+
+@kernel
+def lowest_on_facet(solid: Floats, own: Floats, lowest: Floats, enough: float, eps: float) -> float:
+    """Return a lower bound of f on a facet (3, 3) in the solid's frame; lower what was found in lowest (4,).
+
+    enough: the search ends with a bound that is not below it; eps: or with one that is so near to what was found.
+    """
+    bound, beyond = _nearest_on_plane(solid, own, lowest)
+    if bound >= enough or bound >= lowest[0] - eps:
+        return bound
+    on_sides = math.inf
+    for k in range(3):
+        if beyond & (1 << k):
+            on_sides = min(on_sides, _lowest_on_side(solid, own, (k + 1) % 3, (k + 2) % 3, lowest, enough, eps))
+    return max(bound, on_sides if beyond != 7 else _below_tangent_plane(solid, own, lowest))
+
+
+@kernel
+def _nearest_on_plane(solid: Floats, own: Floats, lowest: Floats) -> tuple[float, int]:
+    """Return a lower bound of f on the plane of a facet, and beyond which sides of it the plane's lowest point lies.
+
+    That point is lowest's where the facet holds it. Side k is opposite corner k and counts 2**k; 7: it is not known, as
+    where the plane cuts the solid.
+    """
+    ux, uy, uz = own[1, 0] - own[0, 0], own[1, 1] - own[0, 1], own[1, 2] - own[0, 2]
+    vx, vy, vz = own[2, 0] - own[0, 0], own[2, 1] - own[0, 1], own[2, 2] - own[0, 2]
+    cx, cy, cz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    size = math.sqrt(cx * cx + cy * cy + cz * cz)
+    if size == 0.0:
+        return -math.inf, 7
+    off = (cx * own[0, 0] + cy * own[0, 1] + cz * own[0, 2]) / size
+    if off < cz / size * 0.5 * (solid[0] + solid[1]):  # the normal leads away from the solid
+        cx, cy, cz, off = -cx, -cy, -cz, -off
+        ux, uy, uz, vx, vy, vz = vx, vy, vz, ux, uy, uz
+        first, second = 2, 1
+    else:
+        first, second = 1, 2
+    nx, ny, nz = cx / size, cy / size, cz / size
+    out = math.sqrt(nx * nx + ny * ny)
+    low, high = solid[2] * out + solid[0] * nz, solid[3] * out + solid[1] * nz
+    bound = off - max(low, high) - solid[4]
+    radius, height = (solid[3], solid[1]) if high > low else (solid[2], solid[0])
+    if bound <= 0.0 or abs(high - low) < ALIKE or radius * out < ALIKE:
+        return bound, 7
+    away = bound + solid[4]
+    x = nx * (radius / out + away) - own[0, 0]
+    y = ny * (radius / out + away) - own[0, 1]
+    z = height + nz * away - own[0, 2]
+    square = size * size
+    a = (cx * (y * vz - z * vy) + cy * (z * vx - x * vz) + cz * (x * vy - y * vx)) / square
+    b = (cx * (uy * z - uz * y) + cy * (uz * x - ux * z) + cz * (ux * y - uy * x)) / square
+    beyond = (1 if a + b > 1.0 else 0) | (1 << first if a < 0.0 else 0) | (1 << second if b < 0.0 else 0)
+    if beyond == 0:
+        lowest[0], lowest[1], lowest[1 + first], lowest[1 + second] = bound, 1.0 - a - b, a, b
+    return bound, beyond
+
+
+@kernel
+def _lowest_on_side(solid: Floats, own: Floats, i: int, j: int, lowest: Floats, enough: float, eps: float) -> float:
+    """Return a lower bound of f on the side from corner i to corner j of a facet. As `lowest_on_facet`."""
+    start, late = 0.0, 1.0
+    before, falls = _along_side(solid, own, i, j, start, lowest)
+    after, rises = _along_side(solid, own, i, j, late, lowest)
+    if falls >= 0.0:
+        return before
+    if rises <= 0.0:
+        return after
+    bound = -math.inf
+    for _ in range(STEPS):
+        at = (before - after + rises * late - falls * start) / (rises - falls)
+        bound = before + falls * (at - start)
+        if bound >= enough or bound >= lowest[0] - eps:
+            break
+        least = LEAST_STEP * (late - start)
+        at = min(max(at, start + least), late - least)
+        value, slope = _along_side(solid, own, i, j, at, lowest)
+        if slope < 0.0:
+            start, before, falls = at, value, slope
+        else:
+            late, after, rises = at, value, slope
+    return bound
+
+
+@kernel
+def _along_side(solid: Floats, own: Floats, i: int, j: int, t: float, lowest: Floats) -> tuple[float, float]:
+    """Return f and its slope at a share t of the side from corner i to corner j; lower what was found in lowest."""
+    dx, dy, dz = own[j, 0] - own[i, 0], own[j, 1] - own[i, 1], own[j, 2] - own[i, 2]
+    x, y = own[i, 0] + t * dx, own[i, 1] + t * dy
+    r = math.sqrt(x * x + y * y)
+    f, by_r, by_z = meridian_distance(solid, r, own[i, 2] + t * dz)
+    if f < lowest[0]:
+        lowest[0], lowest[1], lowest[2], lowest[3] = f, 0.0, 0.0, 0.0
+        lowest[1 + i], lowest[1 + j] = 1.0 - t, t
+    return f, (by_r * (x * dx + y * dy) / r if r > 1e-15 else 0.0) + by_z * dz
+
+
+@kernel
+def _below_tangent_plane(solid: Floats, own: Floats, lowest: Floats) -> float:
+    """Return the lower bound of f on a facet that its tangent plane at the lowest point gives that was found."""
+    a, b, c = lowest[1], lowest[2], lowest[3]
+    x = a * own[0, 0] + b * own[1, 0] + c * own[2, 0]
+    y = a * own[0, 1] + b * own[1, 1] + c * own[2, 1]
+    z = a * own[0, 2] + b * own[1, 2] + c * own[2, 2]
+    r = math.sqrt(x * x + y * y)
+    f, by_r, by_z = meridian_distance(solid, r, z)
+    scale, fall = (by_r / r if r > 1e-15 else 0.0), 0.0
+    for k in range(3):
+        fall = min(fall, scale * (x * (own[k, 0] - x) + y * (own[k, 1] - y)) + by_z * (own[k, 2] - z))
+    return f + fall

@@ -1,0 +1,81 @@
+"""Distances of solids of revolution from single facets: against a solver that knows the solids by their constraints."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from pentapod.geometry.solids import Solid
+from pentapod.mesh import Mesh
+from pentapod.mesh.query.swept_depth import TouchingBody, touch
+from pentapod.mesh.query.tree import FacetTree
+
+RESOLUTION = 1e-7
+
+
+def solved(solid, corners):
+    """The distance of the solid from a facet (3, 3), millimetres, the axis along z: a convex program."""
+    low, high, low_radius, high_radius, rounding = 1e3 * np.array(solid.numbers)
+    corners, slope = 1e3 * corners, (high_radius - low_radius) / (high - low or 1.0)
+
+    def apart(x):
+        a, b = x[:2]
+        return (1.0 - a - b) * corners[0] + a * corners[1] + b * corners[2] - x[2:]
+
+    inside = [
+        {"type": "ineq", "fun": lambda x: np.array([x[0], x[1], 1.0 - x[0] - x[1]])},
+        {"type": "ineq", "fun": lambda x: np.array([x[4] - low, high - x[4]])},
+        {
+            "type": "ineq",
+            "fun": lambda x: low_radius + slope * (x[4] - low) - np.hypot(*x[2:4]),
+        },
+    ]
+    start = np.array([0.3, 0.3, 0.1 * low_radius + 1e-3, 0.0, 0.5 * (low + high)])
+    found = minimize(
+        lambda x: float(apart(x) @ apart(x)), start, constraints=inside, method="SLSQP",
+        options={"ftol": 1e-15, "maxiter": 400},
+    )  # fmt: skip
+    return float(np.linalg.norm(apart(found.x))) - rounding
+
+
+def gap(solid, corners, axis=(0.0, 0.0, 1.0), tip=(0.0, 0.0, 0.0)):
+    tree = FacetTree.of(Mesh.of(corners, [[0, 1, 2]]))
+    found = touch(
+        tree, TouchingBody((solid,)), np.array([tip]), np.array([axis]), threshold=-1.0, resolution=RESOLUTION
+    )
+    return -float(found.deepest[0]), found.points[0][found.depths[0].argmax()]
+
+
+def random_facet(rng, solid):
+    """A facet beside the solid, small or large, thin or not; often along the side, across the rim, or under the end."""
+    size = 10.0 ** rng.uniform(-3.5, -1.5)
+    corners = size * rng.normal(size=(3, 3)) * np.array([1.0, 1.0, 10.0 ** rng.uniform(-2.0, 0.0)])
+    if rng.random() < 0.3:
+        corners[2] = corners[0] + rng.normal() * (corners[1] - corners[0]) + 1e-3 * size * rng.normal(size=3)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0] if rng.random() < 0.5 else np.eye(3)[rng.permutation(3)]
+    at = rng.choice([solid.low, solid.high, 0.5 * (solid.low + solid.high)])
+    away = np.array([*(rng.normal(size=2) * 2.0 * solid.largest_radius), at + 0.3 * rng.normal() * size])
+    return corners @ turn.T + away
+
+
+SOLIDS = {
+    "cylinder": Solid("shank", 0.002, 0.06, 0.002, 0.002),
+    "cone": Solid("holder", 0.03, 0.05, 0.004, 0.012),
+    "rounded": Solid("cutter", 0.002, 0.02, 0.003, 0.003, 0.002),
+    "disc": Solid("cutter", 0.001, 0.001, 0.003, 0.003, 0.001),
+}
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_gaps_are_those_of_a_convex_program(name):
+    solid, rng, compared = SOLIDS[name], np.random.default_rng(5), 0
+    for _ in range(60):
+        corners = random_facet(rng, solid)
+        distance, point = gap(solid, corners)
+        if not distance > 1e-5:  # the solver's gradient ends where the distance does
+            continue
+        compared += 1
+        assert distance == pytest.approx(1e-3 * solved(solid, corners), abs=2e-7)
+        weights = np.linalg.lstsq(np.vstack([corners.T, np.full(3, 1e-2)]), np.append(point, 1e-2), rcond=None)[0]
+        assert weights.min() > -1e-6
+        assert weights @ corners == pytest.approx(point, abs=1e-9)
+    assert compared > 20
