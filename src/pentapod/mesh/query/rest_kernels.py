@@ -38,7 +38,7 @@ def into_frame(motion: Floats, corners: Floats, own: Floats) -> None:
 
 
 @kernel
-def nearest_to_axis(own: Floats, lowest: Floats) -> float:
+def _nearest_to_axis(own: Floats, lowest: Floats) -> float:
     """Write into lowest (4,), from index 1, the weights of the facet's nearest point to the axis; return how far it is.
 
     own (3, 3): corners in the frame of the solid.
@@ -73,7 +73,7 @@ def told_at_once(solid: Floats, own: Floats, lowest: Floats) -> float:
 
     lowest (4,): filled with the lower f of that point and of the highest and lowest corners, and weights of corners.
     """
-    off = nearest_to_axis(own, lowest)
+    off = _nearest_to_axis(own, lowest)
     height = lowest[1] * own[0, 2] + lowest[2] * own[1, 2] + lowest[3] * own[2, 2]
     lowest[0] = meridian_distance(solid, off, height)[0]
     top = max(own[0, 2], own[1, 2], own[2, 2])

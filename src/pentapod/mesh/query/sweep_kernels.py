@@ -137,7 +137,7 @@ def deepest(
 
 
 @kernel
-def deepest_at_rest(
+def _deepest_at_rest(
     solid: Floats,
     motion: Floats,
     corners: Floats,
@@ -214,7 +214,7 @@ def sweep_all(
             found = last >= 0 and deepest_in_facet_at_rest(
                 solid, motions[m], corners[last], best, work, eps, enough, pose, g
             )
-            facets[m] = deepest_at_rest(solid, motions[m], corners, boxes, starts, best, nodes, work, eps, enough)
+            facets[m] = _deepest_at_rest(solid, motions[m], corners, boxes, starts, best, nodes, work, eps, enough)
             if found and facets[m] < 0:
                 facets[m] = last
         if facets[m] >= 0:

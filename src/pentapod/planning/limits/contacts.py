@@ -198,23 +198,23 @@ def _with_gaps(gaps: Floats, cap: float) -> Floats:
 
 def _tool(obstacle: Obstacle, solids: tuple[Solid, ...], bodies: MovingBodies, cap: float, *, numbers: bool) -> Floats:
     """Return for the tool body the gaps, at most `cap`, and the numbers of its contacts (N, 1 + NUMBERS)."""
-    from pentapod.mesh.query.body_kernels import meridian_distance  # noqa: PLC0415  loads numba
+    from pentapod.mesh.query.body_kernels import normals_of_all  # noqa: PLC0415  loads numba
 
     gaps, points = obstacle.surface.bodies(solids, bodies.tips, bodies.axes, cap)
     gaps = np.minimum(gaps + obstacle.allowance, cap)
     column = _with_gaps(gaps, cap)
     if not numbers:
         return column
-    shapes = [np.array(solid.numbers) for solid in solids]
-    for row in np.flatnonzero(np.isfinite(points[:, 0]) & (gaps < cap)):
-        tip, axis, point = bodies.tips[row], bodies.axes[row], points[row]
-        height = float((point - tip) @ axis)
-        across = point - tip - height * axis
-        aside = float(np.linalg.norm(across))
-        _, by_r, by_h = min(meridian_distance(shape, aside, height) for shape in shapes)
-        # From the body to the mesh point; the line along it meets the axis in the centre of the ball.
-        outward = (by_r / aside if aside > 0.0 else 0.0) * across + by_h * axis
-        place = height - aside / max(by_r, OPTIONS.flat) * by_h
-        reach = float(-outward @ (tip + place * axis - point))
-        column[row, 1:] = (place, *(-outward), *point, reach - gaps[row])
+    rows = np.flatnonzero(np.isfinite(points[:, 0]) & (gaps < cap))
+    tips, axes, points = bodies.tips[rows], bodies.axes[rows], points[rows]
+    outward = np.zeros_like(points)  # from the body to the mesh point
+    normals_of_all(np.array([solid.numbers for solid in solids]), tips, axes, points, outward)
+    height, along = np.einsum("ij,ij->i", points - tips, axes), np.einsum("ij,ij->i", outward, axes)
+    across = points - tips - height[:, None] * axes
+    aside = np.linalg.norm(across, axis=1)
+    # The line along it meets the axis in the centre of the ball.
+    sine = np.einsum("ij,ij->i", outward, across) / np.where(aside > 0.0, aside, 1.0)
+    place = height - aside / np.maximum(sine, OPTIONS.flat) * along
+    reach = np.einsum("ij,ij->i", outward, points - tips - place[:, None] * axes)
+    column[rows, 1:] = np.column_stack([place, -outward, points, reach - gaps[rows]])
     return column
