@@ -11,6 +11,7 @@ the tilt centre: the last two terms bound the deviation of the motion, in the bo
 body stands on a plane, whose distance bounds f likewise. Boxes and triangles that cannot contain a deeper point than
 the best known are dropped; the others are halved in space or in time, whichever makes the bound worse. Where the body
 does not turn, f is convex in space and time together: its lowest value over the motion is, and space alone is halved.
+Where it rests as well, most facets are told without halving (`rest_kernels`).
 """
 
 from __future__ import annotations
@@ -210,13 +211,16 @@ def sweep_all(
         if motions[m, 15] > 0.0 or motions[m, 16] > 0.0:
             facets[m] = deepest(solid, motions[m], corners, boxes, starts, best, nodes, work, eps, enough)
         else:
-            last = facets[m - 1] if m > 0 else -1
-            found = last >= 0 and deepest_in_facet_at_rest(
+            # Where poses follow a path, the facet of the last one leaves little of the tree to be searched.
+            last, facets[m] = (facets[m - 1] if m > 0 else -1), -1
+            if last >= 0 and deepest_in_facet_at_rest(
                 solid, motions[m], corners[last], best, work, eps, enough, pose, g
-            )
-            facets[m] = _deepest_at_rest(solid, motions[m], corners, boxes, starts, best, nodes, work, eps, enough)
-            if found and facets[m] < 0:
+            ):
                 facets[m] = last
+            if facets[m] < 0 or -best[0] < enough:
+                deeper = _deepest_at_rest(solid, motions[m], corners, boxes, starts, best, nodes, work, eps, enough)
+                if deeper >= 0:
+                    facets[m] = deeper
         if facets[m] >= 0:
             depths[m] = -best[0]
             for j in range(4):
