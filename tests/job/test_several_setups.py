@@ -172,6 +172,7 @@ def test_the_set_up_sheet_has_a_page_for_each(done, tmp_path):
         assert (tmp_path / "again.html").read_text() == wanted
 
 
+@pytest.mark.slow  # in the fast lane: a set-up planned anew is no whole job
 def test_the_programs_together_are_the_job_and_one_alone_is_not(done, job, capsys):
     """The folder passes; a program alone leaves open who makes the other cuts; with another's piece it fails."""
     out, _ = done
@@ -190,6 +191,7 @@ def test_the_programs_together_are_the_job_and_one_alone_is_not(done, job, capsy
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_too_few_set_ups_are_a_refusal_that_names_what_is_left(job, tmp_path):
     """So large that two poses never reach all of it; files of the run before are gone."""
     large = job.with_name("large.toml")

@@ -102,6 +102,7 @@ def test_a_change_of_what_a_kernel_calls_compiles_anew_and_no_stale_cache_is_use
     assert not list(package.sources.rglob("*.nb[ci]")), "nothing beside the sources"
 
 
+@pytest.mark.slow
 def test_processes_that_compile_at_once_spoil_nothing(package: Package):
     """Each for other types of the same kernels, so that both write into the same index."""
     started = [package.start(argument) for argument in ("1", "1.5")]

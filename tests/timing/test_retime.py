@@ -237,7 +237,7 @@ def test_retime_of_a_reversed_path_takes_as_long(name):
     assert again.duration == pytest.approx(there.duration, rel=2e-3)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(k=st.floats(0.05, 20.0))
 def test_retime_does_not_depend_on_units(k):
     """Lengths times k take as long when every limit is times k."""
@@ -253,7 +253,7 @@ def test_retime_does_not_depend_on_units(k):
     assert scaled.duration == pytest.approx(small.duration, rel=1e-3, abs=2 * FINE)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(k=st.floats(0.3, 3.0))
 def test_retime_scales_with_time(k):
     """Velocities times k and accelerations times k² take 1/k of the time."""

@@ -31,6 +31,7 @@ def test_limit_in_a_gap_that_is_too_narrow_is_the_way_from_its_edges():
     assert 1e3 * found == pytest.approx(1.0 + np.sqrt(9.0 - 6.25), abs=0.01)
 
 
+@pytest.mark.slow
 def test_limit_at_the_tip_of_a_pit_and_in_hollows_wider_and_narrower_than_the_ball():
     (tip,) = limits("inward_cone", [(0.0, 0.0, 6.0)])
     assert 1e3 * tip == pytest.approx(3.0 * (np.sqrt(2.0) - 1.0), abs=0.06)

@@ -63,7 +63,7 @@ def middle_of_first_cut(case):
     return rows_of(case, case.toolpath.starts[1] + 30)
 
 
-@pytest.fixture(params=["cubic", "linear"])
+@pytest.fixture(params=["cubic", pytest.param("linear", marks=pytest.mark.slow)])
 def good(request):
     return request.getfixturevalue(request.param)
 

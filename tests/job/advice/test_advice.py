@@ -97,7 +97,7 @@ def test_the_best_that_passes_comes_first_and_what_fails_is_no_advice(tmp_path):
         planned.append(job)
         return Tried(None, 0.3) if len(planned) > 2 else Tried("placement")
 
-    found = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
+    found = searched(tmp_path, "table too low", plan, points=32, plans=4, wanted=3)
     assert len(planned) == 4
     assert [each.margin for each in found.advice] == [0.3, 0.3]
     assert 300.0 < planned[0].placement.table_z_mm < 600.0
@@ -219,7 +219,7 @@ def test_the_share_of_a_search_that_is_done_never_falls(tmp_path):
     ends: list[float] = []
     shares: list[tuple[float, str]] = []
     tell = lambda _, share, note: shares.append((share, note))  # noqa: E731
-    searched(tmp_path, "table too low", plan, progress=tell, plans=3, wanted=3)
+    searched(tmp_path, "table too low", plan, progress=tell, points=32, plans=3, wanted=3)
     done = [share for share, _ in shares]
     assert done == sorted(done)
     assert ends == pytest.approx([1 / 3, 2 / 3, 1.0][: len(ends)])
@@ -235,11 +235,11 @@ def test_an_interruption_ends_the_search_and_keeps_what_was_found(tmp_path):
         return Tried(None)
 
     planned: list[Job] = []
-    found = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
+    found = searched(tmp_path, "table too low", plan, points=32, plans=4, wanted=3)
     assert found.interrupted
     assert len(planned) == 2
     assert len(found.advice) == 1
-    again = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
+    again = searched(tmp_path, "table too low", plan, points=32, plans=4, wanted=3)
     assert again.advice == ()
     assert again.sentence.startswith("The search was interrupted; tried until then: ")
 

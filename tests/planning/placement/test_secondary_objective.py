@@ -92,7 +92,7 @@ def test_even_weights_change_nothing(desk, quick):
     np.testing.assert_array_equal(plain.placement.transform.matrix, even.placement.transform.matrix)
 
 
-@pytest.mark.parametrize("solver", ["sequential", "ipopt"])
+@pytest.mark.parametrize("solver", ["sequential", pytest.param("ipopt", marks=pytest.mark.slow)])
 def test_a_weight_buys_room(solver, desk, quick):
     """At the optimum the room of the weighed group is that of the others times its weight, in both solvers."""
     answer = plan(quick, desk, tilt=0.0, weights=Weights(strokes=2.0), solver=solver)

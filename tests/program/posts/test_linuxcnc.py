@@ -106,11 +106,20 @@ def check_accelerations(legs, what, folder, said):
     assert measured == pytest.approx(commanded, abs=1.0)
 
 
+def unverified(folder):
+    write_post(given(duration=1.0), "linuxcnc", folder, unverified=True)
+    files = [file for file in folder.rglob("*") if file.is_file()]
+    assert all("UNVERIFIED" in "".join(file.read_text().splitlines()[:2]) for file in files)
+
+
+def test_an_unverified_folder_has_its_mark_in_every_file(tmp_path):
+    unverified(tmp_path)
+
+
+@pytest.mark.slow
 @built
 def test_an_unverified_folder_runs_with_its_mark_in_every_file(tmp_path):
-    write_post(given(duration=1.0), "linuxcnc", tmp_path, unverified=True)
-    files = [file for file in tmp_path.rglob("*") if file.is_file()]
-    assert all("UNVERIFIED" in "".join(file.read_text().splitlines()[:2]) for file in files)
+    unverified(tmp_path)
     for part in ("stream", "player", "trivkins", "kinematics"):
         table = play(tmp_path / part)
         assert len(table) > 300

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 from hashlib import sha256
 from textwrap import dedent
 
@@ -90,10 +91,9 @@ def test_one_byte_of_the_program_undoes_its_verdict(folder, capsys):
     assert not (folder / "again").exists()
 
 
-def test_a_run_is_posted_as_it_was_planned(make_job, tmp_path, capsys):
+def test_a_run_is_posted_as_it_was_planned(usual_run, tmp_path, capsys):
     """A program that its own run judged; not when its verdict or itself is of another run."""
-    job, out = make_job(), tmp_path / "out"
-    assert run(["plan", str(job), "-o", str(out), "--quiet"]) == 0
+    job, out = usual_run[0].path, shutil.copytree(usual_run[1], tmp_path / "out")
     assert run(["post", str(out / "program.csv"), "--to", "linuxcnc", "-o", str(tmp_path / "posted")]) == 0
     assert (tmp_path / "posted" / "kinematics" / "play.sh").is_file()
     # Alone, it is judged anew.
