@@ -49,7 +49,7 @@ def test_stage_by_stage_runs(tmp_path, monkeypatch):
     code = changed(
         re.findall(r"```python\n(.*?)```", page, re.S)[-1],
         ('"toolpaths/dome.stl"', repr(str(ROOT / "toolpaths" / "dome.stl"))),
-        ("stepover=3e-3", "stepover=25e-3"),  # the same, sooner
+        ("stepover=3e-3", "stepover=40e-3, spacing=8e-3"),  # the same, sooner
         ('limits["path_tolerance"])\n', 'limits["path_tolerance"], share=1.0)\n'),  # passes that far apart cover little
     )
     monkeypatch.chdir(tmp_path)

@@ -9,7 +9,6 @@ import pytest
 from pentapod.cli.main import run
 from pentapod.job import Job
 
-
 CHANGES = ["--set", "feed.cut_mm_min=1800", "--set", "placement.component = ++", "--set", 'tool.type="""\nball"""']
 
 

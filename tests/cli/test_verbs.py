@@ -71,7 +71,7 @@ def test_verify_fails_a_program_that_was_changed(usual_run, make_job, tmp_path, 
 
 
 def test_json_and_quiet(make_job, tmp_path, capsys):
-    job, out = make_job(), tmp_path / "out"
+    job, out = make_job(("stepover_mm = 15\nspacing_mm = 4", "stepover_mm = 30\nspacing_mm = 8")), tmp_path / "out"
     assert run(["plan", str(job), "-o", str(out), "--json"]) == 0
     said = capsys.readouterr()
     content = json.loads(said.out)

@@ -11,7 +11,6 @@ import pytest
 
 from pentapod.base.errors import InputError, JobError, MeshError, ToolpathError
 from pentapod.base.refusal import Refusal
-from pentapod.cli.commands.new import dome_stl
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job, judge, pipeline, run, stages, task
 from pentapod.job.artefacts import check_folder
@@ -25,7 +24,6 @@ from pentapod.planning import LegPath, PlacedPath
 from pentapod.program import read_csv
 from pentapod.timing import Explanation, Trajectory
 from pentapod.toolpath import SegmentKind, Toolpath
-from usual_job import job_text
 
 TOOLPATHS = Path(__file__).parents[2] / "toolpaths"
 SHIPPED = sorted(path.stem for path in TOOLPATHS.glob("*.toml"))
@@ -128,6 +126,7 @@ def test_artefacts_agree_with_each_other(usual_run):
     assert all(stage.seconds >= 0 for stage in outcome.stages)
 
 
+@pytest.mark.slow  # in the fast lane: test_determinism.py
 def test_two_runs_give_the_same_bytes(make_job, tmp_path):
     job = Job.load(make_job(("tilt_deg = 0", "tilt_deg = 10")))
     run(job, tmp_path / "a")
@@ -255,9 +254,7 @@ def test_rotation_turns_about_fixed_axes_x_first(make_job):
     assert np.allclose(placement.rotate([1, 0, 0]), [0, 1, 0])
 
 
-@pytest.mark.parametrize(
-    ("period", "interpolation"), [pytest.param(2, "cubic", marks=pytest.mark.slow), (1, "linear")]
-)
+@pytest.mark.parametrize(("period", "interpolation"), [pytest.param(2, "cubic", marks=pytest.mark.slow), (1, "linear")])
 def test_output_settings_reach_the_program(period, interpolation, make_job, tmp_path):
     output = f'[output]\nperiod_ms = {period}\ninterpolation = "{interpolation}"\n\n[placement]'
     outcome = run(Job.load(make_job(("[placement]", output))), tmp_path / "out")

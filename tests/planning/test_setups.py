@@ -63,7 +63,7 @@ def assert_all_cuts_once(path: Toolpath, pieces) -> None:
     np.testing.assert_array_equal(times, cutting_intervals(path))
 
 
-@settings(max_examples=60)
+@settings(max_examples=15)
 @given(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=9), st.floats(0.05, 0.9))
 def test_no_split_between_passes_has_fewer_pieces(places, width):
     path, fits = passes(places), no_wider(np.inf, width)

@@ -50,7 +50,7 @@ def test_the_policy_allows_this_script_and_no_request(name, pages):
 
 @needs_chromium
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("name", ["report", pytest.param("simulation", marks=pytest.mark.slow)])
 def test_a_browser_is_asked_for_nothing(name, pages):
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     with playwright.sync_playwright() as start:

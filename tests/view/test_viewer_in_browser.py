@@ -170,6 +170,7 @@ def test_the_part_is_dragged_and_its_margins_follow(chromium, viewer, opened):
     page.close()
 
 
+@slow
 def test_typed_numbers_are_the_placement_of_a_job(chromium, viewer, opened):
     """As `placement_toml` has them: extrinsic angles about x, y, z."""
     seen = Opened(chromium, viewer)

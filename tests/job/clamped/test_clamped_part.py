@@ -92,6 +92,7 @@ def test_the_command_finds_the_part_and_plans_it_again(usual, capsys) -> None:
         assert tips[0][ends] == pytest.approx(tips[1][ends], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_leans_and_time_laws_are_those_of_the_run_before(usual) -> None:
     folder, _, truth, first = usual
     moved = replan(folder / "out", truth, folder / "moved")

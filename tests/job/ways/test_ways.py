@@ -104,6 +104,7 @@ def test_forged_ways_are_caught(copied):
     assert [c.claim for c in verdict.certificates if not c.passed] == ["way in"]
 
 
+@pytest.mark.slow
 def test_ways_that_are_missing_are_not_judged(copied):
     job, out = copied
     (out / "way_out.csv").unlink()

@@ -41,6 +41,7 @@ def test_a_first_candidate_keeps_the_cone(problem, start):
     assert problem.steepness(start.coefficients).max() <= 1.0 + 1e-12
 
 
+@pytest.mark.slow
 def test_raising_the_margin_matches_the_reference(problem, start, raised):
     """Both end in a local optimum of a problem with kinks; the default may not be the poorer one by much."""
     reference = IpoptSolver(problem, free=True).raise_margin(start)

@@ -70,6 +70,7 @@ def test_hal_clips_a_program_beyond_the_limits(tmp_path):
     assert np.abs(before - after).max() > 0.5
 
 
+@pytest.mark.slow
 @real
 def test_the_legs_as_axes_keep_path_and_time(tmp_path):
     what = given(duration=3.0)

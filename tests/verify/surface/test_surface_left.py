@@ -110,6 +110,7 @@ def test_a_flat_end_that_could_clear_a_floor_up_to_the_wall_must(make):
     assert found.value == pytest.approx(100.0 * 2e-3 * size / size**2, rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_share_near_its_bound_is_sampled_more_finely(monkeypatch):
     """With 64 samples chance decides (16 % for 19.1 %); the foot of the walls is left by the ball's shape."""
     size, tool = 0.02, BallCutter(R)
