@@ -16,11 +16,16 @@ VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECL
 COMMAND = [sys.executable, "-c", "from pentapod.cli.main import main; main()", "plan"]
 
 
-@pytest.mark.parametrize(("stepover", "spacing"), [(30, 8), pytest.param(9, 4, marks=pytest.mark.slow)])
-def test_one_thread_or_two(make_job, tmp_path, stepover, spacing):
-    passes = f"stepover_mm = {stepover}\nspacing_mm = {spacing}"
-    path = make_job(("tilt_deg = 0", "tilt_deg = 10"), ("stepover_mm = 15\nspacing_mm = 4", passes))
-    path.write_text(path.read_text().split("[placement]")[0] + '[placement]\nthen = "force"\n')
+FREE = '[placement]\nthen = "force"\n'
+
+
+@pytest.mark.parametrize("placement", ["as it is", pytest.param(FREE, marks=pytest.mark.slow)], ids=["fixed", "free"])
+def test_one_thread_or_two(make_job, tmp_path, placement):
+    path = make_job(
+        ("tilt_deg = 0", "tilt_deg = 10"), *([("stepover_mm = 15", "stepover_mm = 9")] * (placement == FREE))
+    )
+    if placement == FREE:
+        path.write_text(path.read_text().split("[placement]")[0] + FREE)
     files: list[dict[str, bytes]] = []
     for threads in ("1", "2"):
         out = tmp_path / threads

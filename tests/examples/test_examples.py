@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 DRAWING = sorted(p for p in (ROOT / "examples").glob("*.py") if "matplotlib" in p.read_text(encoding="utf-8"))
 FIRST = DRAWING[0]
-QUICK = ("11_a_refusal_explained", "12_around_a_singular_surface", "13_legs_and_tool")
+QUICK = ("12_around_a_singular_surface", "13_legs_and_tool")
 
 
 @pytest.fixture(autouse=True)

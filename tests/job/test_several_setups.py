@@ -29,7 +29,7 @@ from usual_job import job_text
 EACH = {"program.csv", "plan.npz", "verdict.json", "manifest.json"}
 
 
-def text(setups: int = 3, scale: float = 3.0, stepover: float = 60, spacing: float = 15) -> str:
+def text(setups: int = 3, scale: float = 3.0, stepover: float = 80, spacing: float = 20) -> str:
     """A dome of 180 mm that two poses of a fixture, 120 mm apart, reach together."""
     centre = Machine.load("desk").work.centre * 1e3 + (0.0, 0.0, 20.0)
     shift = np.array([60.0, 0.0, 0.0])

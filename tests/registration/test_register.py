@@ -76,7 +76,10 @@ SYMMETRIC = {
 }
 
 
-@pytest.mark.parametrize("name", SYMMETRIC)
+QUICK = ("sphere", "cylinder", "extruded")
+
+
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in SYMMETRIC])
 def test_motions_that_touches_leave_open_are_named(name) -> None:
     mesh, where, names = SYMMETRIC[name]
     n = mesh.facet_normals

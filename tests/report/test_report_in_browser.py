@@ -157,6 +157,7 @@ def test_the_slider_moves_the_legs_and_the_tool(opened, report):
     assert opened.errors() == []
 
 
+@slow
 def test_keys_and_buttons_move_time_and_view(opened, report):
     page, program = opened.page, report[1].find(Program)
     set_slider(page, 1.0)
@@ -181,6 +182,7 @@ def test_keys_and_buttons_move_time_and_view(opened, report):
     page.locator("[data-look=machine]").click()
 
 
+@slow
 def test_any_time_of_the_page_is_a_place_to_go_to(opened, report):
     page, (_, outcome) = opened.page, report
     claim = next(c for c in outcome.verdict.certificates if c.claim == "leg rates")
@@ -225,8 +227,8 @@ def test_a_point_of_the_path_tells_its_time(opened):
 @pytest.mark.parametrize(
     "kind",
     [
-        *("key.cause", "key.deviation"),
-        *(pytest.param(kind, marks=slow) for kind in ("key.share", "key.force", "key.margin")),
+        "key.cause",
+        *(pytest.param(kind, marks=slow) for kind in ("key.share", "key.deviation", "key.force", "key.margin")),
     ],
 )
 def test_the_path_is_coloured_by(opened, kind):
@@ -311,7 +313,7 @@ def test_the_report_is_ready_within_three_seconds(chromium, report):
     assert min(ready) < 3000.0
 
 
-@pytest.mark.parametrize("without", [pytest.param("webgl", marks=slow), "script"])
+@pytest.mark.parametrize("without", ["webgl", "script"])
 def test_the_first_screen_needs_neither_webgl_nor_script(launch, report, without):
     browser = launch("--disable-3d-apis")
     page = browser.new_page(java_script_enabled=without != "script")

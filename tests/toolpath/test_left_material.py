@@ -16,6 +16,7 @@ def limits(name, points):
     return Samples(Reachable(concave_parts.mesh(name), R, 1e-4), 1e-3 * np.array(points)).gap - R
 
 
+@pytest.mark.slow
 def test_limit_at_the_foot_of_a_wall_is_that_of_the_ball_in_the_corner():
     """The centre in the corner is R from both; at a height h of the wall, or at h from it, it leaves the same."""
     away = np.array([0.0, 0.5, 1.5, 2.9, 4.0])

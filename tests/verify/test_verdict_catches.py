@@ -134,7 +134,7 @@ def test_row_lost(good):
     assert failed(judge(with_legs(good, legs))) == {"leg accelerations", "leg jerks", "feed on cuts"}
 
 
-@pytest.mark.parametrize("name", ["-+", "+-", "--"])
+@pytest.mark.parametrize("name", ["-+", *(pytest.param(name, marks=pytest.mark.slow) for name in ("+-", "--"))])
 def test_mirror_component(good, name):
     mirrored = replace(good, program=replace(good.program, component=Component.parse(name)))
     assert failed(judge(mirrored)) >= {"tip deviation", "starts at the toolpath's start"}

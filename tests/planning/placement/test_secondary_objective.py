@@ -51,7 +51,7 @@ def by_hand(name: str, machine, problem, at) -> float:
     return total
 
 
-@pytest.mark.parametrize("name", AIMS)
+@pytest.mark.parametrize("name", [pytest.param("force", marks=pytest.mark.slow), "time"])
 def test_the_second_aim_gains_and_keeps_the_margin(name, desk, quick, found):
     problem, best = found
     aim, keep = objective_of(name, problem, quick, np.arange(len(quick))), 0.9 * best.smallest

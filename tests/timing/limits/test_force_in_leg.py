@@ -114,6 +114,7 @@ def test_a_force_that_the_weight_alone_exceeds_is_refused():
     assert result.diagnosis[0].constraint.startswith("force in leg")
 
 
+@pytest.mark.slow
 def test_an_override_keeps_a_limit_that_was_added():
     limit, m = ForceInLeg(2.0, 1.0, 15.0), machine(interpolation="cubic")
     trajectory = timed(Path((PATHS["raster"](),)), m, limits=(limit,))

@@ -34,7 +34,9 @@ def turns(points):
     return (along[1:] * along[:-1]).sum(axis=1)
 
 
-@pytest.mark.parametrize(("aspect", "facets"), [(1, 600), (10, 400), pytest.param(30, 900, marks=slow)])
+@pytest.mark.parametrize(
+    ("aspect", "facets"), [(1, 600), *(pytest.param(*each, marks=slow) for each in ((10, 400), (30, 900)))]
+)
 def test_offsets_of_a_circle_are_circles_on_thin_facets(aspect, facets):
     turn = np.linspace(0, 2 * np.pi, 200)
     curve = np.stack([0.02 + 3.5e-3 * np.cos(turn), 0.02 + 3.5e-3 * np.sin(turn), 0 * turn], 1)
@@ -49,7 +51,9 @@ def test_offsets_of_a_circle_are_circles_on_thin_facets(aspect, facets):
     assert set(range(6)) <= set(passes.levels.tolist())
 
 
-@pytest.mark.parametrize(("aspect", "facets"), [(3, 500), (10, 400), pytest.param(30, 900, marks=slow)])
+@pytest.mark.parametrize(
+    ("aspect", "facets"), [(3, 500), *(pytest.param(*each, marks=slow) for each in ((10, 400), (30, 900)))]
+)
 def test_offsets_of_the_border_are_squares_on_thin_facets(aspect, facets):
     passes = offset_paths(PartSurface(plate(aspect, facets), BALL, UP), OffsetOptions(stepover=STEP)).passes
     for k, level in enumerate(passes.levels):

@@ -163,6 +163,7 @@ QUICK_PARTS = {"raster": ["box", "bumps"], "cross-hatch": ["box", "bumps"], "wat
                "offset": ["box"], "spiral": ["box", "bumps"]}  # fmt: skip
 QUICK_FOR_BALLS = {"raster": ["waves", "bumps"], "waterline": ["waves"], "offset": ["box"], "spiral": []}
 
+
 @pytest.mark.parametrize(("name", "part"), grid(ON_PARTS, PARTS, QUICK_PARTS))
 def test_every_strategy_on_every_generated_part(generated, name, part):
     mesh, tool, options = generated[part], FlatEnd(1e-3), told(0.1)[name]
@@ -260,7 +261,8 @@ def bumpy_laws(name, seed, exponent):
     assert again.axes.tobytes() == toolpath.axes.tobytes()
 
 
-@settings(max_examples=3, deadline=None)
+@slow
+@settings(max_examples=9, deadline=None)
 @given(name=st.sampled_from(ON_PARTS), seed=st.integers(0, 10_000), exponent=st.floats(-3.0, 3.0))
 @example(name="edges", seed=4349, exponent=2.845)  # passes that meet, with axes that do not
 def test_bumpy_grids(name, seed, exponent):

@@ -154,6 +154,7 @@ def test_a_beam_covers_what_is_near_its_lines_on_cuts_alone():
     assert "beam's line" in wide.method
 
 
+@pytest.mark.slow
 def test_dense_samples_agree_on_a_wavy_sheet_with_a_leaning_tool():
     """Heights by brute force: many balls along the path, the first that a ray up the normal meets."""
     rng = np.random.default_rng(5)
@@ -201,6 +202,7 @@ def test_motion_that_is_not_known_exactly_counts_for_less():
     assert judged(replay, plate(), tool, scallop + 6e-5).value == 0.0
 
 
+@pytest.mark.slow
 def test_each_piece_answers_for_its_own_part():
     """Three passes each for two set-ups; a piece without one of its passes fails, whatever the other does."""
     tool, lines = BallCutter(R), [line[1:3] for line in raster(2e-3)]
