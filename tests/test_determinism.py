@@ -19,13 +19,17 @@ COMMAND = [sys.executable, "-c", "from pentapod.cli.main import main; main()", "
 FREE = '[placement]\nthen = "force"\n'
 
 
-@pytest.mark.parametrize("placement", ["as it is", pytest.param(FREE, marks=pytest.mark.slow)], ids=["fixed", "free"])
-def test_one_thread_or_two(make_job, tmp_path, placement):
-    path = make_job(
-        ("tilt_deg = 0", "tilt_deg = 10"), *([("stepover_mm = 15", "stepover_mm = 9")] * (placement == FREE))
-    )
-    if placement == FREE:
-        path.write_text(path.read_text().split("[placement]")[0] + FREE)
+@pytest.mark.parametrize(
+    ("passes", "placement"),
+    [
+        pytest.param("stepover_mm = 30\nspacing_mm = 8", None, id="fixed"),
+        pytest.param("stepover_mm = 9\nspacing_mm = 4", FREE, id="free", marks=pytest.mark.slow),
+    ],
+)
+def test_one_thread_or_two(make_job, tmp_path, passes, placement):
+    path = make_job(("tilt_deg = 0", "tilt_deg = 10"), ("stepover_mm = 15\nspacing_mm = 4", passes))
+    if placement is not None:
+        path.write_text(path.read_text().split("[placement]")[0] + placement)
     files: list[dict[str, bytes]] = []
     for threads in ("1", "2"):
         out = tmp_path / threads

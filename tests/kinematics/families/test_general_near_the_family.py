@@ -31,6 +31,7 @@ def test_every_pose_of_a_pose_s_legs_is_found(deviation: float, count: int) -> N
         assert (robot.branch(*found)[:, 0] == np.where(mode == 0, 1, mode)[:, 0]).all()
 
 
+@pytest.mark.slow
 def test_obstacles_and_poses_agree_whatever_the_size_of_the_batch() -> None:
     rng = np.random.default_rng(1)
     robot = GeneralPentapod(BASE, 0.5 * BASE[:, 0] + 1e-9 * rng.uniform(-1.0, 1.0, 5))
