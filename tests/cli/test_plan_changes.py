@@ -14,7 +14,8 @@ CHANGES = ["--set", "feed.cut_mm_min=1800", "--set", "placement.component = ++",
 
 def test_other_values_are_planned_and_their_job_is_kept(make_job, tmp_path, capsys):
     job, out = make_job(), tmp_path / "out"
-    assert run(["plan", str(job), "-o", str(out), *CHANGES, "-q"]) == 0
+    assert run(["plan", str(job), "-o", str(out), *CHANGES, "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
     changed = Job.load(out / "changed-job.toml")
     assert changed.feed.cut_mm_min == 1800.0
     assert changed.mesh_path.samefile(Job.load(job).mesh_path)
@@ -62,7 +63,10 @@ def test_wrong_values_are_one_error_about_the_key(make_job, tmp_path, capsys, ch
 
 
 def test_several_jobs_are_planned_one_after_the_other(make_job, tmp_path, capsys):
-    first, out = make_job(name="first.toml"), tmp_path / "out"
+    first, out = (
+        make_job(("stepover_mm = 15\nspacing_mm = 4", "stepover_mm = 30\nspacing_mm = 8"), name="first.toml"),
+        tmp_path / "out",
+    )
     broken = make_job(("cut_mm_min", "cut"), name="broken.toml")
     assert run(["plan", str(broken), str(first), "-o", str(out), "--json"]) == 2
     said = capsys.readouterr()

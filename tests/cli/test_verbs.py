@@ -70,7 +70,7 @@ def test_verify_fails_a_program_that_was_changed(usual_run, make_job, tmp_path, 
     assert "was made from another job than" in told.err
 
 
-def test_json_and_quiet(make_job, tmp_path, capsys):
+def test_json(make_job, tmp_path, capsys):
     job, out = make_job(("stepover_mm = 15\nspacing_mm = 4", "stepover_mm = 30\nspacing_mm = 8")), tmp_path / "out"
     assert run(["plan", str(job), "-o", str(out), "--json"]) == 0
     said = capsys.readouterr()
@@ -78,8 +78,6 @@ def test_json_and_quiet(make_job, tmp_path, capsys):
     assert content["passed"] is True
     assert set(content["seconds"]) >= {"placement", "timing", "verify"}
     assert said.err == ""
-    assert run(["plan", str(job), "-o", str(out), "--quiet"]) == 0
-    assert capsys.readouterr() == ("", "")
 
 
 def test_a_refusal_is_exit_code_1_with_the_reason(make_job, tmp_path, capsys):

@@ -115,6 +115,7 @@ def test_all_attachments_together_against_many_descents() -> None:
         assert min(found) == pytest.approx(distance.together, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_smaller_movements_keep_the_sign_of_f() -> None:
     rng = np.random.default_rng(34)
     for base in designs(6, 35):

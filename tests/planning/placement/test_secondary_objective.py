@@ -84,6 +84,7 @@ def test_derivatives_of_the_aims(name, quick, found):
         assert slopes[piece] @ x == pytest.approx(slope, rel=1e-3, abs=1e-3 * np.abs(slopes[piece]).max())
 
 
+@pytest.mark.slow
 def test_even_weights_change_nothing(desk, quick):
     plain, even = (plan(quick, desk, tilt=0.0, **more) for more in ({}, {"weights": Weights()}))
     assert isinstance(plain, PlacedPath)

@@ -126,6 +126,7 @@ def test_an_unverified_folder_runs_with_its_mark_in_every_file(tmp_path):
         assert len(table) > 300
 
 
+@pytest.mark.slow
 @real
 def test_what_linuxcnc_refuses_is_said(tmp_path):
     post(given(duration=0.5), "linuxcnc", tmp_path)

@@ -101,7 +101,7 @@ def test_passes_on_a_sphere_leave_the_ridge_of_the_law_of_cosines():
     assert not judged(along(*lines, tool=ball, axes=axes), mesh, ball, 0.95 * ridge).passed
 
 
-@pytest.mark.parametrize("make", [FlatEnd, lambda r: BullNose(r, 5e-4)])
+@pytest.mark.parametrize("make", [FlatEnd, pytest.param(lambda r: BullNose(r, 5e-4), marks=pytest.mark.slow)])
 def test_a_flat_end_that_could_clear_a_floor_up_to_the_wall_must(make):
     size, tool, mesh = 0.02, make(R), pocket()
     ends = {"low": R, "high": size - R, "y1": size - R}
