@@ -6,12 +6,16 @@ import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
 
 from pentapod.cli.commands.new import dome_stl
 from usual_job import job_text
+
+if TYPE_CHECKING:
+    from pentapod.job import Job, Outcome
 
 # A busy machine is no failure. Every run looks at the same examples, so that a run can be repeated;
 # HYPOTHESIS_PROFILE=search looks for new ones.
@@ -38,6 +42,18 @@ def make_job(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return make
+
+
+@pytest.fixture(scope="session")
+def usual_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Job, Path, Outcome]:
+    """The usual job, the folder of its run and the outcome, planned once for all tests that read or copy them."""
+    from pentapod.job import Job, run
+
+    folder = tmp_path_factory.mktemp("usual")
+    (folder / "part.stl").write_bytes(dome_stl(cells=12))
+    (folder / "job.toml").write_text(job_text(), encoding="utf-8")
+    job = Job.load(folder / "job.toml")
+    return job, folder / "out", run(job, folder / "out")
 
 
 @pytest.fixture

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from importlib.metadata import version
 
+import pytest
+
 from pentapod.base.version import processor_kind
 from pentapod.program import read_csv
 
@@ -14,9 +16,20 @@ VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECL
 COMMAND = [sys.executable, "-c", "from pentapod.cli.main import main; main()", "plan"]
 
 
-def test_one_thread_or_two(make_job, tmp_path):
-    path = make_job(("tilt_deg = 0", "tilt_deg = 10"), ("stepover_mm = 15", "stepover_mm = 9"))
-    path.write_text(path.read_text().split("[placement]")[0] + '[placement]\nthen = "force"\n')
+FREE = '[placement]\nthen = "force"\n'
+
+
+@pytest.mark.parametrize(
+    ("passes", "placement"),
+    [
+        pytest.param("stepover_mm = 30\nspacing_mm = 8", None, id="fixed"),
+        pytest.param("stepover_mm = 9\nspacing_mm = 4", FREE, id="free", marks=pytest.mark.slow),
+    ],
+)
+def test_one_thread_or_two(make_job, tmp_path, passes, placement):
+    path = make_job(("tilt_deg = 0", "tilt_deg = 10"), ("stepover_mm = 15\nspacing_mm = 4", passes))
+    if placement is not None:
+        path.write_text(path.read_text().split("[placement]")[0] + placement)
     files: list[dict[str, bytes]] = []
     for threads in ("1", "2"):
         out = tmp_path / threads

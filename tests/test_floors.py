@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import pentapod
@@ -55,6 +56,7 @@ def imported(tree: ast.AST) -> Iterator[str]:
                 yield inner if inner in FILES else node.module
 
 
+@cache
 def imports_of(path: Path) -> set[str]:
     """Return what of the package a file imports; imports within functions count as well."""
     found = imported(ast.parse(path.read_text(encoding="utf-8")))

@@ -41,7 +41,10 @@ def test_no_literal_number_of_legs_above_kinematics() -> None:
     for path in sorted((ROOT / "src" / "pentapod").rglob("*.py")):
         if path.relative_to(ROOT / "src" / "pentapod").parts[0] in ("kinematics", "theory"):
             continue
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        if not re.search(r"\b5\b", text):
+            continue
+        tree = ast.parse(text)
         bodies = [tree.body, *(node.body for node in ast.walk(tree) if isinstance(node, ast.ClassDef))]
         assigned = [node for body in bodies for node in body if isinstance(node, ast.Assign | ast.AnnAssign)]
         constants = {id(inner) for node in assigned for inner in ast.walk(node)}

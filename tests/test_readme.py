@@ -6,6 +6,8 @@ import re
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from pentapod.cli.verbs import VERBS
 from pentapod.job import Job
 
@@ -43,6 +45,7 @@ def test_readme_python_runs(tmp_path, monkeypatch, make_job):
     assert (tmp_path / "out" / "program.csv").is_file()
 
 
+@pytest.mark.slow  # in the fast lane: the same chain in test_public_names.py
 def test_stage_by_stage_runs(tmp_path, monkeypatch):
     """The last block of the page on scripts."""
     page = (ROOT / "docs" / "howto" / "script.md").read_text(encoding="utf-8")

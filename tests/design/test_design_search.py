@@ -60,6 +60,7 @@ def evaluated(*given):
     return real(*given)
 
 
+@pytest.mark.slow
 def test_evaluations_of_another_version_are_not_taken(design_file, tmp_path):
     """Where a stored design is not the one that is asked for, it is evaluated anew from there on."""
     file = DesignFile.load(design_file())

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from pentapod.base import Registry
 from pentapod.cutters import CUTTERS
 from pentapod.machine.families import FAMILIES
@@ -109,6 +111,7 @@ def test_a_job_key_is_added_by_one_field(tmp_path, make_job):
     )
 
 
+@pytest.mark.slow
 def test_the_measures_of_the_tree_are_printed():
     made = subprocess.run(
         [sys.executable, ROOT / "benchmarks" / "structure.py"], capture_output=True, text=True, check=True

@@ -28,7 +28,19 @@ from pentapod.program import Program, Provenance, read_csv, write_csv
 
 ROOT = Path(__file__).parents[2]
 MACHINE_TABLES = ["calibration", "drives", "guard", "guides", "leg_model", "legs", "park"]
-LONG = ("setups", "register", "many-jobs", "design", "quickstart", "override")
+LONG = (
+    "setups",
+    "register",
+    "many-jobs",
+    "design",
+    "quickstart",
+    "override",
+    "view",
+    "tutorial",
+    "sheet",
+    "calibrate",
+    "engraving",
+)
 GUIDES = [*sorted(ROOT.glob("docs/howto/*.md")), ROOT / "docs" / "tutorial.md", ROOT / "docs" / "quickstart.md"]
 RUN = [page for page in GUIDES if "```sh\n" in page.read_text(encoding="utf-8")]
 

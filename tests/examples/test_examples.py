@@ -11,6 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 DRAWING = sorted(p for p in (ROOT / "examples").glob("*.py") if "matplotlib" in p.read_text(encoding="utf-8"))
 FIRST = DRAWING[0]
+QUICK = ("12_around_a_singular_surface", "13_legs_and_tool")
 
 
 @pytest.fixture(autouse=True)
@@ -29,7 +30,9 @@ def check(script: Path, picture: Path) -> None:
     assert kept.is_file(), "the picture is kept in docs/"
 
 
-@pytest.mark.parametrize("script", DRAWING, ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "script", [pytest.param(p, id=p.stem, marks=() if p.stem in QUICK else pytest.mark.slow) for p in DRAWING]
+)
 def test_example_draws(script, tmp_path, monkeypatch):
     from matplotlib import pyplot
 
@@ -41,6 +44,7 @@ def test_example_draws(script, tmp_path, monkeypatch):
     check(script, tmp_path / "picture.png")
 
 
+@pytest.mark.slow
 def test_an_example_draws_from_the_shell(tmp_path):
     command = [sys.executable, "-W", "error", str(FIRST), "--out", str(tmp_path / "picture.png")]
     answer = subprocess.run(command, capture_output=True, text=True, check=False)

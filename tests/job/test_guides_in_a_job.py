@@ -34,7 +34,8 @@ def machine_file(tmp_path_factory):
 
 @pytest.fixture
 def job(make_job, machine_file):
-    return Job.load(make_job(('name = "desk"', f'file = "{machine_file}"')))
+    changes = ('name = "desk"', f'file = "{machine_file}"'), ("stepover_mm = 15", "stepover_mm = 25")
+    return Job.load(make_job(*changes))
 
 
 def verdict_of(job, program):
@@ -71,23 +72,34 @@ def test_guides_from_the_plan_to_the_verdict(job, tmp_path):
     assert pose == pytest.approx(program.legs[40], abs=1e-9)
     assert shown.placed.placement.rail_positions == pytest.approx(rail_positions)
 
-    text = (tmp_path / "program.csv").read_text()
+    changed = tmp_path / "changed.csv"
+    for stand in ("[0.0, 0.0]", '["a", 0, 0, 0, 0]', "3"):
+        changed.write_text(elsewhere(tmp_path, stand))
+        with pytest.raises(ProgramError, match="5 numbers of mm"):
+            read_csv(changed)
+    changed.write_text(elsewhere(tmp_path))  # where they stand has to be said
+    assert verdict_of(job, changed)["guides within their travel"] is False
+
+
+def elsewhere(folder, stand=None):
+    """The program's text with guides that stand elsewhere, or that are not told."""
+    text = (folder / "program.csv").read_text()
     line = re.search(r"# guides_mm = \[.*\]\n", text)[0]
+    return text.replace(line, f"# guides_mm = {stand}\n" if stand else "")
+
+
+@pytest.mark.slow  # in the fast lane: guides of which the program does not tell where they stand
+def test_guides_that_stand_elsewhere_fail(job, tmp_path):
+    run(job, tmp_path)
     changed = tmp_path / "changed.csv"
     for stand, failing in (
         ("[0.0, 0.0, 0.0, 0.0, 0.0]", "machine"),  # another machine, whose legs do not lead along the path
         ("[0.0, 0.0, 40.001, 0.0, 0.0]", "guides within their travel"),
     ):
-        changed.write_text(text.replace(line, f"# guides_mm = {stand}\n"))
+        changed.write_text(elsewhere(tmp_path, stand))
         claims = verdict_of(job, changed)
         assert claims[failing] is False
         assert claims["tip deviation"] is False
-    changed.write_text(text.replace(line, ""))  # where they stand has to be said
-    assert verdict_of(job, changed)["guides within their travel"] is False
-    for stand in ("[0.0, 0.0]", '["a", 0, 0, 0, 0]', "3"):
-        changed.write_text(text.replace(line, f"# guides_mm = {stand}\n"))
-        with pytest.raises(ProgramError, match="5 numbers of mm"):
-            read_csv(changed)
 
 
 def test_where_guides_were_to_stand_is_kept_of_a_job_without_a_program(job, tmp_path, monkeypatch):

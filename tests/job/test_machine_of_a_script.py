@@ -31,6 +31,7 @@ def test_a_job_is_planned_and_judged_on_a_machine_of_a_script(make_job, tmp_path
     assert "machine" in failed
 
 
+@pytest.mark.slow
 def test_the_job_sets_period_and_tool_length_of_a_machine_of_a_script(make_job, tmp_path, slow):
     job = Job.load(
         make_job(("[feed]", "[output]\nperiod_ms = 2\n[feed]"), ("[toolpath]", "length_mm = 200\n[toolpath]"))

@@ -21,6 +21,7 @@ PARTS = {  # mesh, [part], stepover of a ball of 6 mm in mm
     "a patch of a facade": (FACADE, SIDEWAYS + "region_box_mm = [[-100, -30, 70], [100, 30, 130]]", 3),
     "a facade": (FACADE, SIDEWAYS + "region_box_mm = [[-100, -60, 40], [100, 60, 160]]", 2),
     "a small torus": (TORUS, 'unit = "mm"\nscale = 20\nregion_angle_deg = 40', 3),
+    "the top of a torus": (TORUS, 'unit = "mm"\nscale = 15\nregion_angle_deg = 20', 3),
     "a torus": (TORUS, 'unit = "mm"\nscale = 40\nregion_angle_deg = 40', 2),
     "a fan disk": ("fandisk.obj", 'unit = "mm"\nscale = 60\nregion_angle_deg = 30', 2),
     "a sphere": ("unit_sphere.STL", 'unit = "mm"\nscale = 50\nregion_angle_deg = 35', 2),
@@ -31,7 +32,7 @@ PARTS = {  # mesh, [part], stepover of a ball of 6 mm in mm
     ),
 }
 CLAIM = "surface left on the region"
-QUICK = {"a small torus"}
+QUICK = {"the top of a torus"}
 
 
 @pytest.fixture

@@ -11,7 +11,6 @@ import pytest
 
 from pentapod.base.errors import InputError, JobError, MeshError, ToolpathError
 from pentapod.base.refusal import Refusal
-from pentapod.cli.commands.new import dome_stl
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job, judge, run, task
 from pentapod.job.artefacts import check_folder
@@ -27,7 +26,6 @@ from pentapod.planning import LegPath, PlacedPath
 from pentapod.program import read_csv
 from pentapod.timing import Explanation, Trajectory
 from pentapod.toolpath import SegmentKind, Toolpath
-from usual_job import job_text
 
 TOOLPATHS = Path(__file__).parents[2] / "toolpaths"
 SHIPPED = sorted(path.stem for path in TOOLPATHS.glob("*.toml"))
@@ -43,23 +41,13 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.fixture(scope="module")
-def usual(tmp_path_factory):
-    """The usual job and the folder of its run, to be read or copied."""
-    folder = tmp_path_factory.mktemp("usual")
-    (folder / "part.stl").write_bytes(dome_stl(cells=12))
-    (folder / "job.toml").write_text(job_text(), encoding="utf-8")
-    job = Job.load(folder / "job.toml")
-    return job, folder / "out", run(job, folder / "out")
-
-
 def test_the_shipped_jobs_show_every_strategy():
     assert len(SHIPPED) >= 12
     shown = {Job.load(TOOLPATHS / f"{name}.toml").toolpath.strategy for name in SHIPPED}
     assert shown | {"file"} == set(job_strategies())
 
 
-LONG = ("oversize", "spiral")
+LONG = ("oversize", "spiral", "offset", "wavy", "waterline", "rail", "dome", "polish", "saddle", "hatch")
 """Shipped jobs whose toolpaths take long; their strategies have quick tests of their own."""
 
 
@@ -112,8 +100,8 @@ def test_the_oversize_job_with_fewer_waypoints(tmp_path):
     check_shipped(Job.load(path), tmp_path / "out")
 
 
-def test_artefacts_agree_with_each_other(usual):
-    _, out, outcome = usual
+def test_artefacts_agree_with_each_other(usual_run):
+    _, out, outcome = usual_run
     assert outcome.passed
     assert names(out) == WHOLE
     program = read_csv(out / "program.csv")
@@ -140,6 +128,7 @@ def test_artefacts_agree_with_each_other(usual):
     assert all(stage.seconds >= 0 for stage in outcome.stages)
 
 
+@pytest.mark.slow  # in the fast lane: test_determinism.py
 def test_two_runs_give_the_same_bytes(make_job, tmp_path):
     job = Job.load(make_job(("tilt_deg = 0", "tilt_deg = 10")))
     run(job, tmp_path / "a")
@@ -157,8 +146,8 @@ def test_free_placement_gives_the_same_bytes_twice(make_job, tmp_path):
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
-def test_a_refused_job_leaves_no_program_not_even_an_old_one(usual, make_job, tmp_path):
-    out = shutil.copytree(usual[1], tmp_path / "out")
+def test_a_refused_job_leaves_no_program_not_even_an_old_one(usual_run, make_job, tmp_path):
+    out = shutil.copytree(usual_run[1], tmp_path / "out")
     (out / "notes.txt").write_text("mine")
     outcome = run(Job.load(make_job(TOO_FAR)), out, advice=None)
     assert isinstance(outcome.refusal, Refusal)
@@ -178,15 +167,20 @@ def test_a_second_run_on_the_folder_is_told_before_any_work(make_job, tmp_path):
     assert stages == []
 
 
-STAGES = ["plan", "leg_path", "retime", "sample", "judged", "write_arrays", "write_json"]
+SLOW_STAGES = ["sample", "judged", "write_arrays"]
 
 
 @pytest.mark.parametrize(
-    ("stage", "error"), [*((stage, KeyboardInterrupt) for stage in STAGES), ("leg_path", RuntimeError)]
+    ("stage", "error"),
+    [
+        *((stage, KeyboardInterrupt) for stage in ("plan", "leg_path", "retime", "write_json")),
+        *(pytest.param(stage, KeyboardInterrupt, marks=pytest.mark.slow) for stage in SLOW_STAGES),
+        ("leg_path", RuntimeError),
+    ],
 )
-def test_interrupted_runs_change_nothing(stage, error, usual, tmp_path, monkeypatch):
-    job, old, fresh = usual[0], tmp_path / "old", tmp_path / "deep" / "fresh"
-    shutil.copytree(usual[1], old)
+def test_interrupted_runs_change_nothing(stage, error, usual_run, tmp_path, monkeypatch):
+    job, old, fresh = usual_run[0], tmp_path / "old", tmp_path / "deep" / "fresh"
+    shutil.copytree(usual_run[1], old)
     before = contents(old)
 
     def stop(*_: object, **__: object) -> None:
@@ -200,8 +194,8 @@ def test_interrupted_runs_change_nothing(stage, error, usual, tmp_path, monkeypa
     assert not fresh.exists()
 
 
-def test_bad_mesh_changes_nothing(usual, make_job, tmp_path):
-    out = shutil.copytree(usual[1], tmp_path / "out")
+def test_bad_mesh_changes_nothing(usual_run, make_job, tmp_path):
+    out = shutil.copytree(usual_run[1], tmp_path / "out")
     before = contents(out)
     with pytest.raises(MeshError):
         run(Job.load(make_job(mesh=b"solid text, not a mesh\n")), out)
@@ -262,7 +256,7 @@ def test_rotation_turns_about_fixed_axes_x_first(make_job):
     assert np.allclose(placement.rotate([1, 0, 0]), [0, 1, 0])
 
 
-@pytest.mark.parametrize(("period", "interpolation"), [(2, "cubic"), (1, "linear")])
+@pytest.mark.parametrize(("period", "interpolation"), [pytest.param(2, "cubic", marks=pytest.mark.slow), (1, "linear")])
 def test_output_settings_reach_the_program(period, interpolation, make_job, tmp_path):
     output = f'[output]\nperiod_ms = {period}\ninterpolation = "{interpolation}"\n\n[placement]'
     outcome = run(Job.load(make_job(("[placement]", output))), tmp_path / "out")
@@ -284,7 +278,7 @@ def test_a_job_may_limit_the_tool(make_job, tmp_path):
     assert "tip acceleration" in str(outcome.find(Explanation))
 
 
-def test_a_dwell_after_each_cut_by_job_key(usual, make_job, tmp_path):
+def test_a_dwell_after_each_cut_by_job_key(usual_run, make_job, tmp_path):
     """The verdict judges it from the file; a program for the same job without the key fails that claim."""
     job = Job.load(make_job(("cut_mm_min = 3000", "cut_mm_min = 3000\ndwell_s = 0.25")))
     outcome = run(job, tmp_path / "dwell")
@@ -296,12 +290,12 @@ def test_a_dwell_after_each_cut_by_job_key(usual, make_job, tmp_path):
     assert claims["dwells"].passed
     assert claims["dwells"].value == pytest.approx(0.25, abs=0.02)
     assert claims["exact stops"].passed
-    assert outcome.find(Trajectory).duration - usual[2].find(Trajectory).duration > 0.25 * count
-    judged = judge(job, usual[1] / "program.csv")
+    assert outcome.find(Trajectory).duration - usual_run[2].find(Trajectory).duration > 0.25 * count
+    judged = judge(job, usual_run[1] / "program.csv")
     assert not {c.claim: c for c in judged.certificates}["dwells"].passed
 
 
-def test_exact_stops_at_corners_by_job_key(usual, make_job, tmp_path):
+def test_exact_stops_at_corners_by_job_key(usual_run, make_job, tmp_path):
     """The default is 135 degrees."""
     job = Job.load(make_job(("cut_mm_min = 3000", "cut_mm_min = 3000\nstop_angle_deg = 60")))
-    assert len(run(job, tmp_path).find(LegPath).pieces) > len(usual[2].find(LegPath).pieces)
+    assert len(run(job, tmp_path).find(LegPath).pieces) > len(usual_run[2].find(LegPath).pieces)

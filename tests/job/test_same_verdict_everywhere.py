@@ -32,11 +32,11 @@ from pentapod.report import write_report
 from pentapod.verify import Coverage, verify
 
 
-@pytest.fixture
-def planned(make_job, tmp_path):
-    """The usual job, its outcome, and the folder."""
-    job = Job.load(make_job())
-    return job, run(job, tmp_path / "out", writers={REPORT: write_report}), tmp_path / "out"
+@pytest.fixture(scope="module")
+def planned(usual_run, tmp_path_factory):
+    """The usual job, its outcome, and the folder of a run with a report."""
+    job, folder = usual_run[0], tmp_path_factory.mktemp("planned")
+    return job, run(job, folder, writers={REPORT: write_report}), folder
 
 
 def from_python(job, program, sink=0.0):

@@ -31,7 +31,7 @@ from usual_job import job_text
 EACH = {"program.csv", "plan.npz", "verdict.json", "manifest.json"}
 
 
-def text(setups: int = 3, scale: float = 3.0, stepover: float = 60, spacing: float = 15) -> str:
+def text(setups: int = 3, scale: float = 3.0, stepover: float = 80, spacing: float = 20) -> str:
     """A dome of 180 mm that two poses of a fixture, 120 mm apart, reach together."""
     centre = Machine.load("desk").work.centre * 1e3 + (0.0, 0.0, 20.0)
     shift = np.array([60.0, 0.0, 0.0])
@@ -174,6 +174,7 @@ def test_the_set_up_sheet_has_a_page_for_each(done, tmp_path):
         assert (tmp_path / "again.html").read_text() == wanted
 
 
+@pytest.mark.slow  # in the fast lane: a set-up planned anew is no whole job
 def test_the_programs_together_are_the_job_and_one_alone_is_not(done, job, capsys):
     """The folder passes; a program alone leaves open who makes the other cuts; with another's piece it fails."""
     out, _ = done
@@ -192,6 +193,7 @@ def test_the_programs_together_are_the_job_and_one_alone_is_not(done, job, capsy
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_too_few_set_ups_are_a_refusal_that_names_what_is_left(job, tmp_path):
     """So large that two poses never reach all of it; files of the run before are gone."""
     large = job.with_name("large.toml")

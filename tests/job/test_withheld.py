@@ -101,6 +101,7 @@ def refused_of(job):
     return foreseen(job, reports, toolpath, job_specification(job, machine, mesh, lambda: toolpath).cutting)
 
 
+@pytest.mark.slow
 def test_what_the_passes_beside_dropped_cuts_reach_is_not_missed(tmp_path):
     """Nearly as much is dropped of both caps; of the second the ball reaches all on its way beside that."""
     assert "0.48 % of the region" in str(refused_of(leaning(tmp_path, 80.0, 0.3)))

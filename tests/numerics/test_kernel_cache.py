@@ -78,6 +78,7 @@ def package(tmp_path: Path) -> Package:
     return Package(tmp_path)
 
 
+@pytest.mark.slow
 def test_the_first_run_says_that_it_compiles_and_the_second_does_not(tmp_path):
     collision_world = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     said = [
@@ -102,6 +103,7 @@ def test_a_change_of_what_a_kernel_calls_compiles_anew_and_no_stale_cache_is_use
     assert not list(package.sources.rglob("*.nb[ci]")), "nothing beside the sources"
 
 
+@pytest.mark.slow
 def test_processes_that_compile_at_once_spoil_nothing(package: Package):
     """Each for other types of the same kernels, so that both write into the same index."""
     started = [package.start(argument) for argument in ("1", "1.5")]
@@ -136,6 +138,7 @@ def test_without_a_folder_to_write_kernels_run_all_the_same(package: Package, tm
     assert not list(package.sources.rglob("*.nb[ci]"))
 
 
+@pytest.mark.slow
 def test_folders_of_other_versions_go_after_a_month_without_use(package: Package, tmp_path: Path):
     cache = tmp_path / "own"
     names = ("pentapod-kernels-old", "pentapod-kernels-young", "somebody-else")

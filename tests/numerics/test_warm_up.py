@@ -53,6 +53,7 @@ def test_every_kernel_that_python_imports_is_in_the_list():
     assert not missing, "make kernels writes the list"
 
 
+@pytest.mark.slow
 def test_what_is_warm_is_not_compiled_again(tmp_path):
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
 

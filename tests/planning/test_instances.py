@@ -68,7 +68,10 @@ def certified(placed: PlacedPath, robot: Machine, instance: Instance, folder: Pa
     return verdict.passed
 
 
-@pytest.mark.parametrize("instance", FEW, ids=lambda i: i.name)
+@pytest.mark.parametrize(
+    "instance",
+    [pytest.param(each, id=each.name, marks=() if each is FEW[0] else pytest.mark.slow) for each in FEW],
+)
 def test_planned_or_rightly_refused(instance, tmp_path):
     assert check(instance, 20_000, tmp_path)
 

@@ -63,7 +63,7 @@ def assert_all_cuts_once(path: Toolpath, pieces) -> None:
     np.testing.assert_array_equal(times, cutting_intervals(path))
 
 
-@settings(max_examples=60)
+@settings(max_examples=15)
 @given(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=9), st.floats(0.05, 0.9))
 def test_no_split_between_passes_has_fewer_pieces(places, width):
     path, fits = passes(places), no_wider(np.inf, width)
@@ -93,7 +93,14 @@ def test_passes_that_are_too_long_are_split_across():
     assert str(pieces[0]).startswith("x up to ")
 
 
-@pytest.mark.parametrize(("width", "depth", "tiles"), [(0.6, 0.6, 4), (0.4, 0.6, 6), (0.6, 0.4, 6)])
+@pytest.mark.parametrize(
+    ("width", "depth", "tiles"),
+    [
+        (0.6, 0.6, 4),
+        pytest.param(0.4, 0.6, 6, marks=pytest.mark.slow),
+        pytest.param(0.6, 0.4, 6, marks=pytest.mark.slow),
+    ],
+)
 def test_a_part_too_large_both_ways_is_split_in_columns(width, depth, tiles):
     path = passes(np.linspace(0.0, 1.0, 101).tolist(), points=101)
     fits = no_wider(width, depth)

@@ -179,7 +179,8 @@ def soft_job(tmp_path_factory):
     (folder / "soft.toml").write_text(text, encoding="utf-8")
     (folder / "part.stl").write_bytes(dome_stl(cells=12))
     job = folder / "job.toml"
-    job.write_text(job_text().replace('name = "desk"', 'file = "soft.toml"'), encoding="utf-8")
+    text = job_text().replace('name = "desk"', 'file = "soft.toml"').replace("stepover_mm = 15", "stepover_mm = 18")
+    job.write_text(text, encoding="utf-8")
     assert run(["plan", str(job), "-o", str(folder / "out"), "-q"]) == 0
     return folder
 

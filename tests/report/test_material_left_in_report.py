@@ -68,6 +68,7 @@ def test_points_are_spread_evenly_over_the_region(planned):
     assert nearest.max() < 3.0 * np.sqrt(mesh.facet_areas.sum() / len(points))
 
 
+@pytest.mark.slow
 def test_a_spot_is_shown_where_the_path_passes_it(planned, tmp_path):
     """A spot of 4 mm on the top of the part: the keys that tell it are beside it, and none is far away."""
     _, outcome = planned

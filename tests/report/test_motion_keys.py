@@ -49,8 +49,8 @@ def test_keys_are_within_a_fiftieth_of_a_millimetre_of_the_program(make_job, tmp
     assert np.abs(lengths - 1e3 * program.legs).max() < 2.0 * EXACT_MM
 
 
-def test_keys_tell_the_worst_until_the_next(make_job, tmp_path):
-    outcome = run(Job.load(make_job()), tmp_path / "out")
+def test_keys_tell_the_worst_until_the_next(usual_run, tmp_path):
+    outcome = usual_run[2]
     text = write_report(outcome, tmp_path / "report.html").read_text(encoding="utf-8")
     data, arrays, placed = page_data(text), page_arrays(text), outcome.find(PlacedPath)
     assert placed is not None
@@ -102,7 +102,7 @@ def test_rows_that_are_kept_hold_the_others():
     assert np.linalg.norm(between - points, axis=1).max() < 1.0001e-3
 
 
-@pytest.mark.parametrize("compensation", ["gravity", "none"])
+@pytest.mark.parametrize("compensation", ["gravity", pytest.param("none", marks=pytest.mark.slow)])
 def test_keys_tell_forces_and_deflection_as_the_verdict_does(make_job, tmp_path, compensation):
     text = (resources.files("pentapod.machine") / "library" / "desk.toml").read_text(encoding="utf-8")
     text = text.replace("min_length_mm", "stiffness_n_um = 20\nmin_length_mm", 1) + "\n[drives]\npeak_force_n = 300\n"

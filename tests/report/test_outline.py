@@ -112,6 +112,7 @@ def test_outline_of_an_open_sheet_and_of_nothing_seen():
     assert sum(float(np.ptp(line[:, 0])) for line in edge_on.lines) >= 40.0 - 0.1
 
 
+@pytest.mark.slow
 def test_outline_of_three_hundred_thousand_facets_is_quick():
     count = 390
     x, y = np.meshgrid(np.linspace(0, 200, count), np.linspace(0, 200, count))

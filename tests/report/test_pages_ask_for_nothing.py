@@ -11,11 +11,8 @@ from pathlib import Path
 import pytest
 
 from browsers import CHROMIUM, needs_chromium
-from pentapod.cli.commands.new import dome_stl
-from pentapod.job import Job, run
 from pentapod.report import write_report, write_simulation
 from pentapod.simulate import Reference, Tracking, simulate_servo
-from usual_job import job_text
 
 sys.path.append(str(Path(__file__).parents[1] / "program"))
 from short_motion import motion, placed
@@ -24,11 +21,8 @@ PAGES = ("report", "simulation")
 
 
 @pytest.fixture(scope="module")
-def pages(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("pages")
-    (folder / "part.stl").write_bytes(dome_stl(cells=12))
-    (folder / "job.toml").write_text(job_text(), encoding="utf-8")
-    outcome = run(Job.load(folder / "job.toml"), folder / "out")
+def pages(usual_run, tmp_path_factory):
+    folder, outcome = tmp_path_factory.mktemp("pages"), usual_run[2]
     reference = Reference(*motion(duration=0.2))
     toolpath = placed().transformed(reference.program.placement.inverse())
     tracking = Tracking(simulate_servo(reference), reference, toolpath, 5e-5)
@@ -56,7 +50,7 @@ def test_the_policy_allows_this_script_and_no_request(name, pages):
 
 @needs_chromium
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.parametrize("name", PAGES)
+@pytest.mark.parametrize("name", ["report", pytest.param("simulation", marks=pytest.mark.slow)])
 def test_a_browser_is_asked_for_nothing(name, pages):
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     with playwright.sync_playwright() as start:

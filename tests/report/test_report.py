@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
 from itertools import chain, pairwise
@@ -69,8 +70,8 @@ def page_of(outcome: Outcome, folder) -> tuple[str, Page]:
     return text, page
 
 
-def test_report_of_a_passed_job(make_job, tmp_path):
-    outcome = run(Job.load(make_job()), tmp_path / "out")
+def test_report_of_a_passed_job(usual_run, tmp_path):
+    outcome = usual_run[2]
     text, page = page_of(outcome, tmp_path)
     count = len(outcome.verdict.certificates)
     assert page.text.index(f"All {count} claims") < page.text.index("cycle time") < page.text.index("Worst places")
@@ -98,8 +99,8 @@ def test_report_of_a_passed_job(make_job, tmp_path):
     assert data["scene"]["machine"]["beside"] == []
 
 
-def test_claims_are_folded_by_kind_with_the_nearest_of_each(make_job, tmp_path):
-    outcome = run(Job.load(make_job()), tmp_path / "out")
+def test_claims_are_folded_by_kind_with_the_nearest_of_each(usual_run, tmp_path):
+    outcome = usual_run[2]
     text, _ = page_of(outcome, tmp_path)
     folded = re.findall(r'<details class="group good">(.*?)</details>\n', text, re.S)
     assert len(folded) == 6
@@ -122,8 +123,8 @@ def test_kinds_of_claims_that_others_add_or_that_name_a_set_up():
         assert claim_kind(claim) < len(CLAIM_KINDS), claim
 
 
-def test_signals_are_those_of_the_program(make_job, tmp_path):
-    outcome = run(Job.load(make_job()), tmp_path / "out")
+def test_signals_are_those_of_the_program(usual_run):
+    outcome = usual_run[2]
     program, trajectory, toolpath = (outcome.find(kind) for kind in (Program, Trajectory, Toolpath))
     assert program is not None
     assert trajectory is not None
@@ -186,26 +187,27 @@ def test_a_refusal_is_drawn_in_the_machine_where_it_came_nearest(make_job, tmp_p
     assert data["scene"]["machine"]["base"] == pytest.approx(1e3 * machine.robot.base_joints)
 
 
-def test_the_fixture_is_drawn(make_job, tmp_path):
+@pytest.mark.parametrize(
+    ("frame", "name"), [("part", "fixture"), pytest.param("machine", "table", marks=pytest.mark.slow)]
+)
+def test_the_fixture_is_drawn(make_job, tmp_path, frame, name):
     path = make_job()
     path.with_name("held.stl").write_bytes(dome_stl(cells=4))
-    text = path.read_text()
-    for frame, name in (("machine", "table"), ("part", "fixture")):
-        path.write_text(f'{text}\n[fixture]\nmesh = "held.stl"\nunit = "mm"\nframe = "{frame}"\n')
-        outcome = run(Job.load(path), tmp_path / frame)
-        page, _ = page_of(outcome, tmp_path)
-        mesh = next(mesh for mesh in page_data(page)["scene"]["meshes"] if mesh["name"] == name)
-        placed = outcome.find(PlacedPath)
-        shown = placed if placed is not None else outcome.refusal.attempt
-        vertices = load_mesh(path.with_name("held.stl"), "mm").vertices
-        wanted = vertices if frame == "machine" else shown.placement.transform.apply(vertices)
-        points = page_arrays(page)[mesh["vertices"]]
-        np.testing.assert_allclose(np.sort(points, axis=0), np.sort(1e3 * wanted, axis=0), atol=3e-3)
-        assert (f"<title>{name}</title>" in page) is (placed is not None)
+    path.write_text(f'{path.read_text()}\n[fixture]\nmesh = "held.stl"\nunit = "mm"\nframe = "{frame}"\n')
+    outcome = run(Job.load(path), tmp_path / frame)
+    page, _ = page_of(outcome, tmp_path)
+    mesh = next(mesh for mesh in page_data(page)["scene"]["meshes"] if mesh["name"] == name)
+    placed = outcome.find(PlacedPath)
+    shown = placed if placed is not None else outcome.refusal.attempt
+    vertices = load_mesh(path.with_name("held.stl"), "mm").vertices
+    wanted = vertices if frame == "machine" else shown.placement.transform.apply(vertices)
+    points = page_arrays(page)[mesh["vertices"]]
+    np.testing.assert_allclose(np.sort(points, axis=0), np.sort(1e3 * wanted, axis=0), atol=3e-3)
+    assert (f"<title>{name}</title>" in page) is (placed is not None)
 
 
-def test_report_of_a_failed_verdict_puts_the_failures_first(make_job, tmp_path):
-    outcome = run(Job.load(make_job()), tmp_path / "out")
+def test_report_of_a_failed_verdict_puts_the_failures_first(usual_run, tmp_path):
+    outcome = usual_run[2]
     broken = outcome.verdict.certificates
     broken = (*broken[:-1], type(broken[-1])("a claim that fails", False, 2.0, 1.0, "mm", broken[-1].where, "by hand"))
     failed = Outcome(outcome.job, outcome.machine, outcome.stages, type(outcome.verdict)(broken))
@@ -214,9 +216,9 @@ def test_report_of_a_failed_verdict_puts_the_failures_first(make_job, tmp_path):
     assert page.text.index("a claim that fails") < page.text.index("leg rates")
 
 
-def test_report_shows_claims_not_judged_with_the_reason(make_job, tmp_path):
+def test_report_shows_claims_not_judged_with_the_reason(usual_run, tmp_path):
     """A program that fails only by it shows the cause; one that passes by waivers shows them."""
-    outcome = run(Job.load(make_job()), tmp_path / "out")
+    outcome = usual_run[2]
     for waived, status, lead, mark in (
         (False, "failed", "2 claims were not judged. Do not run it.", "not judged"),
         (True, "passed", "2 more were not judged: the job waives them.", "waived"),
@@ -234,9 +236,10 @@ def test_report_shows_claims_not_judged_with_the_reason(make_job, tmp_path):
             assert f"{name} {mark} nobody told {name}" in text
 
 
-def test_report_escapes_names(make_job, tmp_path):
-    path = make_job(name="a<script>alert(1)</script>&.toml".replace("/", "_"))
-    _, page = page_of(run(Job.load(path), tmp_path / "out"), tmp_path)
+def test_report_escapes_names(usual_run, tmp_path):
+    job, _, outcome = usual_run
+    path = job.path.with_name("a<script>alert(1)</script>&.toml".replace("/", "_"))
+    _, page = page_of(replace(outcome, job=replace(job, path=path)), tmp_path)
     assert "a<script>alert(1)<_script>&" in page.text
 
 
@@ -290,9 +293,9 @@ def test_numbers_durations_and_placements_as_text():
     assert "towards 0.0°" in placement_sentences(leaning)[1]
 
 
-def test_the_setup_sheet_names_the_limit_at_every_place(make_job, tmp_path):
+def test_the_setup_sheet_names_the_limit_at_every_place(usual_run, tmp_path):
     """The stretches of the band join to the whole path, and each is told by the limit that is nearest there."""
-    outcome = run(Job.load(make_job()), tmp_path / "out")
+    outcome = usual_run[2]
     placed = outcome.find(PlacedPath)
     assert placed is not None
     text, page = page_of(outcome, tmp_path)

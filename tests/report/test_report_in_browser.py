@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from browsers import CHROMIUM, IN_A_BROWSER, PATIENCE_MS
-from pentapod.job import Job, run
 from pentapod.program import Program
 from pentapod.report import write_report
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 pytestmark = IN_A_BROWSER
+slow = pytest.mark.slow
 
 CONTRAST = """() => {
   const parse = (text) => {
@@ -69,17 +69,10 @@ def chromium(launch):
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory):
+def report(usual_run, tmp_path_factory):
     """The report of the small job of all tests."""
-    from pentapod.cli.commands.new import dome_stl
-    from usual_job import job_text
-
-    folder = tmp_path_factory.mktemp("report") / "dome"
-    folder.mkdir()
-    (folder / "part.stl").write_bytes(dome_stl(cells=12))
-    (folder / "job.toml").write_text(job_text(), encoding="utf-8")
-    outcome = run(Job.load(folder / "job.toml"), folder / "out")
-    return write_report(outcome, folder / "report.html"), outcome
+    outcome = usual_run[2]
+    return write_report(outcome, tmp_path_factory.mktemp("report") / "report.html"), outcome
 
 
 class Opened:
@@ -100,7 +93,7 @@ class Opened:
         return [text for text in self.said if not any(hint.lower() in text.lower() for hint in hints)]
 
 
-@pytest.fixture(scope="module", params=["light", "dark"])
+@pytest.fixture(scope="module", params=["light", pytest.param("dark", marks=slow)])
 def opened(request, chromium, report):
     page = Opened(chromium, report[0], request.param)
     if shots := os.environ.get("PENTAPOD_SHOTS"):
@@ -164,6 +157,7 @@ def test_the_slider_moves_the_legs_and_the_tool(opened, report):
     assert opened.errors() == []
 
 
+@slow
 def test_keys_and_buttons_move_time_and_view(opened, report):
     page, program = opened.page, report[1].find(Program)
     set_slider(page, 1.0)
@@ -188,6 +182,7 @@ def test_keys_and_buttons_move_time_and_view(opened, report):
     page.locator("[data-look=machine]").click()
 
 
+@slow
 def test_any_time_of_the_page_is_a_place_to_go_to(opened, report):
     page, (_, outcome) = opened.page, report
     claim = next(c for c in outcome.verdict.certificates if c.claim == "leg rates")
@@ -229,7 +224,13 @@ def test_a_point_of_the_path_tells_its_time(opened):
     page.locator("[data-look=machine]").click()
 
 
-@pytest.mark.parametrize("kind", ["key.share", "key.cause", "key.deviation", "key.force", "key.margin"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "key.cause",
+        *(pytest.param(kind, marks=slow) for kind in ("key.share", "key.deviation", "key.force", "key.margin")),
+    ],
+)
 def test_the_path_is_coloured_by(opened, kind):
     page = opened.page
     page.locator("[data-look=part]").click()
@@ -264,6 +265,7 @@ def test_report_on_a_dark_screen_prints_black_on_white(opened):
     assert page.evaluate(ink) == before
 
 
+@slow
 def test_report_prints_on_four_pages_of_a4(chromium, report, tmp_path):
     opened = Opened(chromium, report[0])
     pdf = opened.page.pdf(path=tmp_path / "report.pdf", prefer_css_page_size=True)
@@ -288,6 +290,7 @@ def test_report_prints_on_four_pages_of_a4(chromium, report, tmp_path):
     opened.page.close()
 
 
+@slow
 def test_a_telephone_shows_the_report_without_scrolling_sideways(chromium, report):
     narrow = Opened(chromium, report[0], width=390)
     if shots := os.environ.get("PENTAPOD_SHOTS"):
@@ -299,6 +302,7 @@ def test_a_telephone_shows_the_report_without_scrolling_sideways(chromium, repor
     narrow.page.close()
 
 
+@slow
 def test_the_report_is_ready_within_three_seconds(chromium, report):
     """From navigation to scene and plots, without a GPU; the best of three, for machines that are busy."""
     ready = []

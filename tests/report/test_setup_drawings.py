@@ -111,8 +111,10 @@ def test_setup_is_drawn_on_every_family_with_labels_apart(standing, name):
     assert drawn == pytest.approx(scale * apart, abs=0.2), "no mirror image, one scale"
 
 
-@pytest.mark.parametrize("tilt", [0.0, 3.0, 30.0])
-@pytest.mark.parametrize("shift", [(0, 0, 0), (150, 80, -40), (-85.0, 17.0, 0.0)])
+@pytest.mark.parametrize("tilt", [0.0, pytest.param(3.0, marks=pytest.mark.slow), 30.0])
+@pytest.mark.parametrize(
+    "shift", [(150, 80, -40), *(pytest.param(s, marks=pytest.mark.slow) for s in ((0, 0, 0), (-85.0, 17.0, 0.0)))]
+)
 def test_setup_labels_are_apart_wherever_the_part_is(standing, shift, tilt):
     for turn in (0.0, 90.0, -137.0):
         run = standing("desk", shift, turn, tilt)
@@ -121,6 +123,7 @@ def test_setup_labels_are_apart_wherever_the_part_is(standing, shift, tilt):
         assert [crossed(drawing) for drawing in drawings(text)] == [[]] * 4, "no leg goes through a word"
 
 
+@pytest.mark.slow
 def test_a_part_that_is_moved_is_drawn_where_it_stands_now(standing):
     """Outlines of a mesh are remembered: each place has its own."""
     runs = [standing("desk", (5.0, 0.0, 0.0), *turned) for turned in ((0.0, 0.0), (44.0, 0.0), (44.0, 20.0))]

@@ -76,7 +76,7 @@ def pages_in(pdf: bytes) -> int:
     return len(re.findall(rb"/Type\s*/Page\b(?!s)", pdf))
 
 
-@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("count", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_sheet_prints_a_page_for_each_set_up(chromium, sheets, count):
     page = opened(chromium, sheets[count - 1], 800)
     pdf = page.pdf(prefer_css_page_size=True)
@@ -95,8 +95,11 @@ def test_sheet_prints_a_page_for_each_set_up(chromium, sheets, count):
     page.close()
 
 
-@pytest.mark.parametrize("width", [390, 1280])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    ("scheme", "width"),
+    [("light", 1280), *(pytest.param(*each, marks=pytest.mark.slow) for each in
+                        (("light", 390), ("dark", 390), ("dark", 1280)))],
+)  # fmt: skip
 def test_sheet_on_a_screen_is_quiet_and_legible(chromium, sheets, width, scheme):
     page = opened(chromium, sheets[0], width, scheme=scheme)
     assert page.said == []

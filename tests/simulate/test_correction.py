@@ -115,6 +115,7 @@ def test_correction_helps_other_drives(drives):
         assert before[1].max() >= 5.0 * after[1].max()
 
 
+@pytest.mark.slow
 def test_correction_works_with_random_gains():
     """Soft and stiff, quick and late, at the machine's largest accelerations: it never makes things much worse."""
     rng = np.random.default_rng(11)

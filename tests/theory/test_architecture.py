@@ -91,6 +91,7 @@ def test_one_attachment_alone_against_a_fine_curve() -> None:
             assert (signs(alone[leg] * (1 + 1e-4)) != sign).any()
 
 
+@pytest.mark.slow
 def test_all_attachments_together_against_many_descents() -> None:
     rng = np.random.default_rng(32)
     for base in designs(3, 33):
@@ -114,6 +115,7 @@ def test_all_attachments_together_against_many_descents() -> None:
         assert min(found) == pytest.approx(distance.together, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_smaller_movements_keep_the_sign_of_f() -> None:
     rng = np.random.default_rng(34)
     for base in designs(6, 35):

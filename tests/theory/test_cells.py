@@ -145,7 +145,7 @@ def test_sampled_poses_lie_in_their_cell(delta: Fraction, shifted: bool) -> None
             assert (pentapod.branch(p, i) == COMPONENTS[index]).all()
 
 
-@pytest.mark.parametrize("delta", DELTAS[:3])
+@pytest.mark.parametrize("delta", [DELTAS[0], *(pytest.param(d, marks=pytest.mark.slow) for d in DELTAS[1:3])])
 def test_boundaries_can_be_approached_and_no_others(delta: Fraction, random_poses) -> None:
     """Draw poses close to a pose of one cell, at many scales; the cells they fall in are those it bounds."""
     pentapod = pentapod_of(delta)

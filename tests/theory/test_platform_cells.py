@@ -56,7 +56,7 @@ def test_the_counts_for_a_small_delta() -> None:
 
 
 @pytest.mark.parametrize("delta", [0.5, 1.0, 5.0 / 3.0, -5.0 / 3.0])
-@pytest.mark.parametrize("x6", [1.4, -0.8])
+@pytest.mark.parametrize("x6", [1.4, pytest.param(-0.8, marks=pytest.mark.slow)])
 def test_lines_through_a6_are_in_the_cells_that_say_so_and_in_no_others(delta: float, x6: float) -> None:
     """Drawn by their definition, with each special value of (s, i) in turn; the cell is found by the pose alone."""
     pentapod, rng = LinearPentapod.quadratic(BASE, delta), np.random.default_rng(3)

@@ -37,6 +37,7 @@ def raster_end():
     return piece(np.array([piece.length]))[0]
 
 
+@pytest.mark.slow
 def test_explained_lower_bound_against_quadrature():
     m = machine(v=0.05)
     knots = tuple(np.linspace(0, 0.05, 52)[1:-1])

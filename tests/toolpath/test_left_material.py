@@ -16,6 +16,7 @@ def limits(name, points):
     return Samples(Reachable(concave_parts.mesh(name), R, 1e-4), 1e-3 * np.array(points)).gap - R
 
 
+@pytest.mark.slow
 def test_limit_at_the_foot_of_a_wall_is_that_of_the_ball_in_the_corner():
     """The centre in the corner is R from both; at a height h of the wall, or at h from it, it leaves the same."""
     away = np.array([0.0, 0.5, 1.5, 2.9, 4.0])
@@ -31,6 +32,7 @@ def test_limit_in_a_gap_that_is_too_narrow_is_the_way_from_its_edges():
     assert 1e3 * found == pytest.approx(1.0 + np.sqrt(9.0 - 6.25), abs=0.01)
 
 
+@pytest.mark.slow
 def test_limit_at_the_tip_of_a_pit_and_in_hollows_wider_and_narrower_than_the_ball():
     (tip,) = limits("inward_cone", [(0.0, 0.0, 6.0)])
     assert 1e3 * tip == pytest.approx(3.0 * (np.sqrt(2.0) - 1.0), abs=0.06)

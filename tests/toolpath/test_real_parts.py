@@ -20,6 +20,7 @@ from pentapod.toolpath import (
 )
 
 pytestmark = pytest.mark.parts
+slow = pytest.mark.slow
 
 FILES = {  # facets; closed; as found in the files by another reader
     "wavy_mesh_with_hole.ply": (1_347, False),
@@ -44,11 +45,19 @@ def test_every_part_is_diagnosed(parts, name):
         assert str(diagnosis).count("\n") >= 1
 
 
-# A hundred loose facets that cross each other: their drive surface takes half a minute.
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "soup.stl" else []) for name in FILES]
-)
-@pytest.mark.parametrize("tool", [BallCutter(6e-3), FlatEnd(3e-3)], ids=["ball", "flat"])
+TOOLS = {"ball": BallCutter(6e-3), "flat": FlatEnd(3e-3), "standoff": StandOff(5e-3)}
+QUICK = {("ball", "fandisk.obj"), *(("flat", name) for name in (
+    "wavy_mesh_with_hole.ply", "wavy_vase_open_low_res.stl", "1002_tray_bottom.STL", "torus.STL", "unit_sphere.STL"
+))}  # fmt: skip
+
+
+def grid(tools, names, quick):
+    """All pairs of tool and part."""
+    pairs = [(tool, name) for tool in tools for name in names]
+    return [pytest.param(TOOLS[p[0]], p[1], marks=() if p in quick else slow, id="-".join(p)) for p in pairs]
+
+
+@pytest.mark.parametrize(("tool", "name"), grid(("ball", "flat"), FILES, QUICK))
 def test_every_part_is_rastered_on_its_surface(parts, name, tool):
     """The ball's centre is a radius from the part; the flat end's contacts are on it."""
     mesh = load_mesh(parts / name, "mm")
@@ -82,8 +91,10 @@ JOBS = {
 }
 
 
-@pytest.mark.parametrize("name", JOBS)
-@pytest.mark.parametrize("tool", [FlatEnd(3e-3), StandOff(5e-3)], ids=["flat", "standoff"])
+QUICK_JOBS = {("flat", "torus.STL"), ("standoff", "wavy_mesh_with_hole.ply")}
+
+
+@pytest.mark.parametrize(("tool", "name"), grid(("flat", "standoff"), JOBS, QUICK_JOBS))
 def test_parts_of_the_jobs_are_covered(parts, name, tool):
     unit, scale, region = JOBS[name]
     mesh = load_mesh(parts / name, unit, scale=scale)
@@ -102,6 +113,7 @@ def test_parts_of_the_jobs_are_covered(parts, name, tool):
     assert report.stepover == 3e-3
 
 
+@slow  # in the fast lane: test_raster.py leaves a hole out
 def test_the_hole_of_the_wavy_mesh_is_left_out(parts):
     mesh = load_mesh(parts / "wavy_mesh_with_hole.ply", "mm", scale=10.0)
     report = toolpath_with_report(mesh, BallCutter(3e-3), RasterOptions(stepover=3e-3))[1]

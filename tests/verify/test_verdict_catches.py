@@ -63,7 +63,7 @@ def middle_of_first_cut(case):
     return rows_of(case, case.toolpath.starts[1] + 30)
 
 
-@pytest.fixture(params=["cubic", "linear"])
+@pytest.fixture(params=["cubic", pytest.param("linear", marks=pytest.mark.slow)])
 def good(request):
     return request.getfixturevalue(request.param)
 
@@ -134,7 +134,7 @@ def test_row_lost(good):
     assert failed(judge(with_legs(good, legs))) == {"leg accelerations", "leg jerks", "feed on cuts"}
 
 
-@pytest.mark.parametrize("name", ["-+", "+-", "--"])
+@pytest.mark.parametrize("name", ["-+", *(pytest.param(name, marks=pytest.mark.slow) for name in ("+-", "--"))])
 def test_mirror_component(good, name):
     mirrored = replace(good, program=replace(good.program, component=Component.parse(name)))
     assert failed(judge(mirrored)) >= {"tip deviation", "starts at the toolpath's start"}

@@ -39,6 +39,7 @@ def test_reports_and_the_result_come_back():
     assert seen == [("half", 0.5, "of it")]
 
 
+@pytest.mark.slow
 def test_an_error_has_its_text():
     with pytest.raises(PentapodError, match=r"number: no such number \(got 3\)"):
         Apart().result(wrong, progress=lambda *report: None)

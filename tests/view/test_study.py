@@ -88,6 +88,7 @@ def test_a_long_path_is_thinned_and_keeps_the_ends_of_its_passes():
     assert np.isin(np.arange(50), drawn_waypoints(np.array([0, 20, 49]))).all()
 
 
+@pytest.mark.slow
 def test_many_waypoints_are_judged_evenly(opened):
     count = 30_000
     turn = np.linspace(0.0, 60.0, count)

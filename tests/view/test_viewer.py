@@ -190,6 +190,7 @@ def test_viewer_plans_again_where_the_part_is(own):
     assert Job.load(job).digest == after.opened.program.provenance.job_digest
 
 
+@pytest.mark.slow  # in the fast lane: advice of the command, tests/job/advice
 def test_a_refusal_is_told_with_its_advice(own):
     before = own.runs[0].viewed
     news, _ = planned_there(own, shifted(before.opened.placement, 1.0, 0.0, 0.0))

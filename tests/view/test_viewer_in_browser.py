@@ -23,6 +23,7 @@ from pentapod.view.viewed import placement_of
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 pytestmark = IN_A_BROWSER
+slow = pytest.mark.slow
 DEMO = Path(__file__).parents[2] / "toolpaths" / "dome.toml"
 HERE = "window.report.live.placement"
 LEGS = "() => window.report.view.machine.legs.map((leg) => leg.leg.position.distanceTo(leg.joint.position))"
@@ -169,6 +170,7 @@ def test_the_part_is_dragged_and_its_margins_follow(chromium, viewer, opened):
     page.close()
 
 
+@slow
 def test_typed_numbers_are_the_placement_of_a_job(chromium, viewer, opened):
     """As `placement_toml` has them: extrinsic angles about x, y, z."""
     seen = Opened(chromium, viewer)
@@ -189,6 +191,7 @@ def test_typed_numbers_are_the_placement_of_a_job(chromium, viewer, opened):
     seen.page.close()
 
 
+@slow
 def test_files_of_a_placement_are_saved_and_opened(chromium, viewer, opened, tmp_path):
     seen = Opened(chromium, viewer)
     page = seen.page
@@ -209,6 +212,7 @@ def test_files_of_a_placement_are_saved_and_opened(chromium, viewer, opened, tmp
     page.close()
 
 
+@slow
 def test_the_slider_moves_the_machine_with_the_part(chromium, viewer, opened):
     seen = Opened(chromium, viewer)
     page, program = seen.page, opened.program
@@ -237,6 +241,7 @@ def test_the_slider_moves_the_machine_with_the_part(chromium, viewer, opened):
     page.close()
 
 
+@slow  # in the fast lane: test_viewer.py plans again
 def test_the_part_is_planned_where_it_is(chromium, viewer, opened):
     seen = Opened(chromium, viewer)
     page = seen.page
@@ -262,6 +267,7 @@ def test_the_part_is_planned_where_it_is(chromium, viewer, opened):
     page.close()
 
 
+@slow
 def test_keys_move_the_part_and_reach_everything(chromium, viewer):
     """Each control of the panel is reached by Tab; arrow keys in a number move the part."""
     seen = Opened(chromium, viewer)
@@ -283,6 +289,7 @@ def test_keys_move_the_part_and_reach_everything(chromium, viewer):
     page.close()
 
 
+@slow
 @pytest.mark.parametrize(("scheme", "width"), [("dark", 1280), ("light", 390)])
 def test_the_viewer_fits_dark_and_narrow_screens(chromium, viewer, scheme, width):
     seen = Opened(chromium, viewer, scheme, width)
@@ -301,6 +308,7 @@ def test_the_viewer_fits_dark_and_narrow_screens(chromium, viewer, scheme, width
     page.close()
 
 
+@slow  # in the fast lane: test_viewer.py compares two runs
 def test_two_runs_have_one_slider(chromium, planned, opened, tmp_path):
     shutil.copytree(planned[0], tmp_path / "job")
     job = tmp_path / "job" / "job.toml"
@@ -328,6 +336,7 @@ def test_two_runs_have_one_slider(chromium, planned, opened, tmp_path):
         page.close()
 
 
+@slow
 def test_without_webgl_the_part_is_placed_by_numbers(launch, viewer):
     browser = launch("--disable-3d-apis")
     page = browser.new_page()
@@ -341,6 +350,7 @@ def test_without_webgl_the_part_is_placed_by_numbers(launch, viewer):
     browser.close()
 
 
+@slow
 def test_the_end_of_the_server_is_told(chromium, planned, tmp_path):
     shutil.copytree(planned[0], tmp_path / "job")
     with Viewer(open_run(tmp_path / "job" / "out"), port=18640) as viewer:
@@ -357,7 +367,7 @@ def demo(tmp_path_factory):
     return folder
 
 
-@pytest.mark.slow
+@slow
 def test_the_demo_is_drawn_within_two_and_a_half_seconds(chromium, demo):
     """Of opening the address, without a GPU; the best of three, for machines that are busy."""
     with Viewer(open_run(demo), port=18660) as viewer:

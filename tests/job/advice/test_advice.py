@@ -97,7 +97,7 @@ def test_the_best_that_passes_comes_first_and_what_fails_is_no_advice(tmp_path):
         planned.append(job)
         return Tried(None, 0.3) if len(planned) > 2 else Tried("placement")
 
-    found = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
+    found = searched(tmp_path, "table too low", plan, points=32, plans=4, wanted=3)
     assert len(planned) == 4
     assert [each.margin for each in found.advice] == [0.3, 0.3]
     assert 300.0 < planned[0].placement.table_z_mm < 600.0
@@ -206,6 +206,7 @@ def machine_length(job: Job) -> float:
     return 1e3 * job_machine(job.with_(tool={"length_mm": None})).tool_length
 
 
+@pytest.mark.slow
 def test_the_share_of_a_search_that_is_done_never_falls(tmp_path):
     """The time that is left is told from it; the plans end at the shares that they were given."""
 
@@ -219,7 +220,7 @@ def test_the_share_of_a_search_that_is_done_never_falls(tmp_path):
     ends: list[float] = []
     shares: list[tuple[float, str]] = []
     tell = lambda _, share, note: shares.append((share, note))  # noqa: E731
-    searched(tmp_path, "table too low", plan, progress=tell, plans=3, wanted=3)
+    searched(tmp_path, "table too low", plan, progress=tell, points=32, plans=3, wanted=3)
     done = [share for share, _ in shares]
     assert done == sorted(done)
     assert ends == pytest.approx([1 / 3, 2 / 3, 1.0][: len(ends)])
@@ -227,21 +228,21 @@ def test_the_share_of_a_search_that_is_done_never_falls(tmp_path):
     assert any("plan 2 of at most 3: " in note and note.endswith(": timing") for _, note in shares)
 
 
-def test_an_interruption_ends_the_search_and_keeps_what_was_found(tmp_path):
+@pytest.mark.parametrize("kept", [0, pytest.param(1, marks=pytest.mark.slow)])
+def test_an_interruption_ends_the_search_and_keeps_what_was_found(tmp_path, kept):
     def plan(job: Job, _) -> Tried:
         planned.append(job)
-        if len(planned) > 1:
+        if len(planned) > kept:
             raise KeyboardInterrupt
         return Tried(None)
 
     planned: list[Job] = []
-    found = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
+    found = searched(tmp_path, "table too low", plan, points=32, plans=4, wanted=3)
     assert found.interrupted
-    assert len(planned) == 2
-    assert len(found.advice) == 1
-    again = searched(tmp_path, "table too low", plan, plans=4, wanted=3)
-    assert again.advice == ()
-    assert again.sentence.startswith("The search was interrupted; tried until then: ")
+    assert len(planned) == kept + 1
+    assert len(found.advice) == kept
+    if not kept:
+        assert found.sentence.startswith("The search was interrupted; tried until then: ")
 
 
 def test_a_trial_whose_search_for_a_placement_is_interrupted_ends(tmp_path):

@@ -37,6 +37,7 @@ def test_nearer_passes_are_those_that_leave_as_little_as_was_asked(tmp_path):
     job.with_(**found[0].changes)
 
 
+@pytest.mark.slow
 def test_what_a_run_of_an_end_has_tried_by_itself_is_not_tried_again(tmp_path):
     job = Job.load(REFUSED["passes too far apart"].write(tmp_path))
     flat = job.with_(tool={"type": "flat"}, axis={"mode": "fixed", "direction": [0.0, 0.0, 1.0], "tilt_deg": 0.0})
@@ -47,6 +48,7 @@ def test_what_a_run_of_an_end_has_tried_by_itself_is_not_tried_again(tmp_path):
     assert apart == pytest.approx(0.2 * flat.toolpath.stepover_mm, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_bound_that_follows_from_the_passes_stays(tmp_path):
     """Else less would be asked of nearer passes, and they would fail again."""
     job = Job.load(REFUSED["passes too far apart"].write(tmp_path)).with_(tolerance={"left_mm": None})

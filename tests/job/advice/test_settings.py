@@ -59,6 +59,7 @@ def test_boxes_about_a_hole_lie_beside_it(tmp_path):
         assert high[1] - low[1] == pytest.approx(90.0)
 
 
+@pytest.mark.slow
 def test_a_smaller_region_is_judged_at_places_that_the_tool_reaches(tmp_path):
     """At the foot of a wall a ball's centre is a radius away from both sides, and so is its stem."""
     job, machine, mesh, tool = loaded(tmp_path, "pocket_boss along normals")

@@ -42,6 +42,7 @@ def test_a_part_beyond_the_reach_is_begun_with_as_it_is(tmp_path):
     assert own.changes == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parts
 def test_a_wide_part_out_of_reach_with_its_tool_axes_is_refused_before_it_has_a_drive_surface(tmp_path, parts):
     """The drive surface of this teapot, 758 mm wide, takes minutes; along its normals no machine comes near it."""

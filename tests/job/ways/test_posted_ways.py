@@ -152,6 +152,7 @@ def test_a_restart_without_a_clear_way_in_is_refused(parked, tmp_path, capsys, m
     assert not (tmp_path / "post").exists()
 
 
+@pytest.mark.slow  # in the fast lane: a post begins and ends there
 @real
 def test_linuxcnc_starts_at_the_park_pose_and_does_not_jump(parked, tmp_path):
     """After homing, which tells LinuxCNC where the joints stand, no joint jumps."""

@@ -25,6 +25,8 @@ from pentapod.program import quantised, read_csv, write_csv
 from pentapod.toolpath.formats import read_toolpath
 from pentapod.verify import Replay
 
+slow = pytest.mark.slow
+
 
 def specification_of(job, out):
     machine, mesh = job_machine(job), job_mesh(job)
@@ -102,6 +104,7 @@ def test_forged_ways_are_caught(copied):
     assert [c.claim for c in verdict.certificates if not c.passed] == ["way in"]
 
 
+@pytest.mark.slow
 def test_ways_that_are_missing_are_not_judged(copied):
     job, out = copied
     (out / "way_out.csv").unlink()
@@ -114,7 +117,11 @@ def test_ways_that_are_missing_are_not_judged(copied):
 @pytest.mark.parametrize(
     ("tip", "cause"),
     [
-        ("[85, -17, 1400]", "the park pose is not within the limits of the machine in the program's component ++: leg"),
+        pytest.param(
+            "[85, -17, 1400]",
+            "the park pose is not within the limits of the machine in the program's component ++: leg",
+            marks=slow,
+        ),
         ("[85, -17, 480]", "the park pose is not within the limits"),  # in the dome, which hangs down to z 467
     ],
 )
@@ -128,7 +135,7 @@ def test_park_poses_that_cannot_be_are_refused(tmp_path, tip, cause):
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"plan.npz", "verdict.json", "manifest.json"}
 
 
-@pytest.mark.parametrize(("top_mm", "passes"), [(402.0, True), (398.0, False)])
+@pytest.mark.parametrize(("top_mm", "passes"), [pytest.param(402.0, True, marks=slow), (398.0, False)])
 def test_the_cutter_keeps_clear_of_the_fixture_on_a_way(tmp_path, top_mm, passes):
     """A ball of 10 mm parked at z 400, over a block or with its lowest 2 mm in it; the shank begins 5 mm higher."""
     job = parked_job(tmp_path, "\n[park]\ntip_mm = [0, -17, 400]\n")

@@ -117,7 +117,8 @@ def test_the_criteria_are_what_they_say(paper: LinearPentapod) -> None:
     np.testing.assert_allclose(stiffness_criterion(springs, 0.3)(*one)[0], softest, rtol=1e-8)
 
 
-@pytest.mark.parametrize("cells", [11, pytest.param(41, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("cells", [11, 41])
 @pytest.mark.parametrize("name", ["conditioning", "stiffness"])
 def test_the_choice_is_as_good_as_a_fine_grid(paper: LinearPentapod, name: str, cells: int) -> None:
     criterion = {"conditioning": conditioning_criterion(1.0), "stiffness": stiffness_criterion([1e6] * 5, 0.3)}[name]

@@ -54,7 +54,7 @@ def test_no_shorter_way_to_a_singular_position(pentapod: LinearPentapod, random_
         assert np.linalg.norm(found.x - p) == pytest.approx(distance, rel=1e-5)
 
 
-@pytest.mark.parametrize("about", [0.0, 0.35])
+@pytest.mark.parametrize("about", [pytest.param(0.0, marks=pytest.mark.slow), 0.35])
 def test_no_smaller_turn_to_a_singular_direction(
     pentapod: LinearPentapod, random_poses, leg_determinant, about: float
 ) -> None:

@@ -164,13 +164,15 @@ def solved(name: str, sixth: bool) -> tuple[Monodromy, np.ndarray, np.ndarray]:
     return oracle, *oracle.all_solutions(quiet=5)
 
 
-@pytest.mark.parametrize(("name", "lines", "poses"), [("quadratic", 4, 8), ("general", 8, 16)])
+@pytest.mark.parametrize(
+    ("name", "lines", "poses"), [("quadratic", 4, 8), pytest.param("general", 8, 16, marks=pytest.mark.slow)]
+)
 def test_number_of_modes_over_the_complex_numbers(name: str, lines: int, poses: int) -> None:
     assert len(solved(name, sixth=False)[1]) == lines
     assert len(solved(name, sixth=True)[1]) == poses
 
 
-@pytest.mark.parametrize("name", PLATFORMS)
+@pytest.mark.parametrize("name", ["quadratic", pytest.param("general", marks=pytest.mark.slow)])
 def test_the_real_modes_are_the_real_solutions_of_the_system(name: str) -> None:
     platform, (oracle, solutions, base) = PLATFORMS[name], solved(name, sixth=True)
     p, rotation = random_poses(3, 5)

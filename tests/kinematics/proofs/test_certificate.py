@@ -14,7 +14,7 @@ from pentapod.kinematics.proofs import certificate
 from pentapod.numerics.bernstein import elevate, split
 
 
-@pytest.mark.parametrize("k", [1, 3])
+@pytest.mark.parametrize("k", [1, pytest.param(3, marks=pytest.mark.slow)])
 def test_bounds_hold_in_exact_arithmetic_on_random_intervals(pentapod: LinearPentapod, k: int) -> None:
     n = 30 if k == 1 else 8
     coefficients = np.concatenate([segments(pentapod, n, k, seed, reach) for seed, reach in ((0, 1e-3), (1, 0.2))])

@@ -15,6 +15,7 @@ from leg_motions import Exact, grazing, segments
 
 from pentapod.kinematics import LinearPentapod, certify_component
 from pentapod.numerics.bernstein import elevate
+from pentapods import MACHINES
 
 Poly = flint.fmpq_poly
 
@@ -148,6 +149,10 @@ def run(pentapod: LinearPentapod, share: float) -> dict[str, int]:
     return totals
 
 
+@pytest.mark.parametrize(
+    "pentapod",
+    [pytest.param(m, id=name, marks=() if name == "paper" else pytest.mark.slow) for name, m in MACHINES.items()],
+)
 def test_random_and_touching_intervals(pentapod: LinearPentapod) -> None:
     totals = run(pentapod, 0.008)
     assert min(totals["proven"], totals["refuted"]) > 3

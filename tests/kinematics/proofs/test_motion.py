@@ -141,7 +141,7 @@ def grazing_intervals(nominal: LinearPentapod, n: int, seed: int):
     return np.stack([ends[:-1], 2.0 * vertex - 0.5 * (ends[:-1] + ends[1:]), ends[1:]], axis=-1), p[turns], i[turns]
 
 
-@pytest.mark.parametrize(("n", "each"), [(150, 25), pytest.param(10000, 250, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("n", "each"), [(50, 25), pytest.param(10000, 250, marks=pytest.mark.slow)])
 def test_never_falsely_proven_in_exact_arithmetic(nominal, n, each):
     machine = AsBuiltPentapod.of(nominal)
     singular = proven = 0

@@ -119,6 +119,7 @@ def _pose(tips, axes):
     return tips + MACHINE.tool_length * axes, -axes
 
 
+@pytest.mark.slow
 def test_a_ball_bar_in_another_component_is_told_so():
     seen = replace(measured("ballbar", 60, 3, setups=3), component=Component(1, -1))
     with pytest.raises(MachineError, match=r'in component .*, the file says "\+-"; write .*"\+\+".*"--"'):

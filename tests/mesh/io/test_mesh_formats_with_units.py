@@ -14,6 +14,7 @@ from pentapod.base.errors import MeshError
 from pentapod.mesh import Mesh, load_mesh
 from pentapod.mesh.io.registry import states_unit
 
+slow = pytest.mark.slow
 CORE = 'xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"'
 POINTS = np.array([[0, 0, 0], [10, 0, 0], [0, 20, 0], [0, 0, 30]])
 FACETS = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -216,13 +217,17 @@ def beyond(header):
     ("how", "words"),
     [
         ({"change": without_view}, "its vertices are compressed"),
-        ({"change": elsewhere}, "its vertices are in another file"),
         ({"mode": 1}, "lines, points or fans"),
-        ({"change": as_shares}, "or stored as shares"),
-        ({"change": by_weights}, "its vertices are moved by weights"),
-        ({"change": many_times}, "placed by a list"),
-        ({"change": lambda header: header.update(extensionsRequired=["X"])}, "needs an extension that is not read: X"),
         ({"change": beyond}, "cannot be read as GLB: it is broken"),
+        pytest.param({"change": elsewhere}, "its vertices are in another file", marks=slow),
+        pytest.param({"change": as_shares}, "or stored as shares", marks=slow),
+        pytest.param({"change": by_weights}, "its vertices are moved by weights", marks=slow),
+        pytest.param({"change": many_times}, "placed by a list", marks=slow),
+        pytest.param(
+            {"change": lambda header: header.update(extensionsRequired=["X"])},
+            "needs an extension that is not read: X",
+            marks=slow,
+        ),
     ],
 )
 def test_a_glb_that_would_lose_facets_is_refused(tmp_path, how, words):
@@ -239,7 +244,7 @@ def test_a_glb_that_was_cut_off_is_refused(tmp_path):
 
 
 @needs_step
-@pytest.mark.parametrize("chordal", [1e-4, pytest.param(1e-5, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("chordal", [1e-4, pytest.param(1e-5, marks=slow)])
 def test_a_step_part_has_the_normals_of_its_surfaces(chordal):
     """Facets near the surface, normals of the ball itself."""
     mesh = load_mesh(STEP, "inch", chordal=chordal)

@@ -79,7 +79,7 @@ def waves():
 
 def test_the_tree_finds_the_nearest_of_all_facets_up_to_any_distance():
     tree, rng = FacetTree.of(waves()), np.random.default_rng(4)
-    points = rng.uniform([-0.01, -0.01, -0.01], [0.07, 0.05, 0.01], (300, 3))
+    points = rng.uniform([-0.01, -0.01, -0.01], [0.07, 0.05, 0.01], (100, 3))
     g = np.zeros(3)
     every = np.array([[facet_distance(facet, *point, g) for facet in tree.corners] for point in points])
     least = every.min(axis=1)

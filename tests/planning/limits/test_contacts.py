@@ -113,7 +113,12 @@ def test_margins_are_distances_of_samples(desk, crowd, place):
 
 
 @pytest.mark.parametrize(
-    ("name", "fence"), [("desk", [0.25, 0.0, 0.35]), ("spr", [-0.24, -0.15, 0.12]), ("prpu", [-0.2, 0.15, 0.15])]
+    ("name", "fence"),
+    [
+        ("desk", [0.25, 0.0, 0.35]),
+        pytest.param("spr", [-0.24, -0.15, 0.12], marks=pytest.mark.slow),
+        pytest.param("prpu", [-0.2, 0.15, 0.15], marks=pytest.mark.slow),
+    ],
 )
 def test_the_formula_equals_the_margins_and_their_slopes(name, fence):
     """At the poses where contacts were taken: the value, and central differences of the true margins."""

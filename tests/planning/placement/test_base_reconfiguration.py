@@ -106,6 +106,7 @@ def test_curvature_is_that_of_the_machine_with_its_guides_moved(sliding, here):
         assert -x @ bent @ x == pytest.approx(second, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_slides_as_good_as_those_of_another_method(sliding, here):
     """A fixed placement, strict normals: slides alone are left to choose; against differential evolution."""
     problem = problem_of(sliding, here)

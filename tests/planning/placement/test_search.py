@@ -33,6 +33,7 @@ def names(margins):
     return [limit.name for limit in margins.limits]
 
 
+@pytest.mark.slow
 def test_what_does_not_fit_alone_is_answered_without_obstacles(desk, wide, collision_world):
     problem = PlacementProblem.of(ToolpathSamples.of(wide, 0.2), desk, component=PLUS, collision_world=collision_world)
     alone = search(problem.without_collision_world(), options=SearchOptions(tried=2))

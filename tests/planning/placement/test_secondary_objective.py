@@ -51,7 +51,7 @@ def by_hand(name: str, machine, problem, at) -> float:
     return total
 
 
-@pytest.mark.parametrize("name", AIMS)
+@pytest.mark.parametrize("name", [pytest.param("force", marks=pytest.mark.slow), "time"])
 def test_the_second_aim_gains_and_keeps_the_margin(name, desk, quick, found):
     problem, best = found
     aim, keep = objective_of(name, problem, quick, np.arange(len(quick))), 0.9 * best.smallest
@@ -84,6 +84,7 @@ def test_derivatives_of_the_aims(name, quick, found):
         assert slopes[piece] @ x == pytest.approx(slope, rel=1e-3, abs=1e-3 * np.abs(slopes[piece]).max())
 
 
+@pytest.mark.slow
 def test_even_weights_change_nothing(desk, quick):
     plain, even = (plan(quick, desk, tilt=0.0, **more) for more in ({}, {"weights": Weights()}))
     assert isinstance(plain, PlacedPath)
@@ -92,7 +93,7 @@ def test_even_weights_change_nothing(desk, quick):
     np.testing.assert_array_equal(plain.placement.transform.matrix, even.placement.transform.matrix)
 
 
-@pytest.mark.parametrize("solver", ["sequential", "ipopt"])
+@pytest.mark.parametrize("solver", ["sequential", pytest.param("ipopt", marks=pytest.mark.slow)])
 def test_a_weight_buys_room(solver, desk, quick):
     """At the optimum the room of the weighed group is that of the others times its weight, in both solvers."""
     answer = plan(quick, desk, tilt=0.0, weights=Weights(strokes=2.0), solver=solver)

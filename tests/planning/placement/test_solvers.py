@@ -41,6 +41,7 @@ def test_a_first_candidate_keeps_the_cone(problem, start):
     assert problem.steepness(start.coefficients).max() <= 1.0 + 1e-12
 
 
+@pytest.mark.slow
 def test_raising_the_margin_matches_the_reference(problem, start, raised):
     """Both end in a local optimum of a problem with kinks; the default may not be the poorer one by much."""
     reference = IpoptSolver(problem, free=True).raise_margin(start)
@@ -78,6 +79,7 @@ def test_smoothing_reports_each_step_and_can_be_ended_there(problem, raised):
     assert seen == [("tool axis", "smoothing, step 1"), ("tool axis", "smoothing, step 2")]
 
 
+@pytest.mark.slow
 def test_smooth_axes_match_the_reference(problem, raised):
     """The same problem at a given placement: the same optimum to 0.1 %."""
     keep, spline = 0.9 * raised.smallest, AxisSpline.of(problem.samples, problem.cone)

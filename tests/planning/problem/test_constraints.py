@@ -139,6 +139,7 @@ def best(cap_placed):
     return cap_placed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_a_table_is_kept_by_both_solvers(desk, cap, best, solver):
     height = best.placement.transform.translation[2]

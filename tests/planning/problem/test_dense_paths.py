@@ -76,6 +76,7 @@ def test_leans_between_are_linear_along_the_path():
     np.testing.assert_allclose(path.spread(leans, rows)[:, 0], 0.1 * path.tilt_centres[:, 0], atol=1e-15)
 
 
+@pytest.mark.slow
 def test_the_plan_holds_at_every_waypoint(desk, dense, every_fifth):
     """Legs from the robot's own kinematics; no margin is lost beside the same path with a fifth of the waypoints."""
     assert len(ToolpathSamples.of(dense, TILT).shaping(dense.starts)) < 0.5 * len(dense)

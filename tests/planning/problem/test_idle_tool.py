@@ -58,6 +58,7 @@ def test_a_stem_over_a_dome_is_idle_in_a_narrow_cone(desk, tilt, idle):
     assert bool(without_idle_tool(world, desk, ToolpathSamples.of(path, tilt)).tool) != idle
 
 
+@pytest.mark.slow
 def test_a_stem_in_a_groove_counts_and_a_holder_too(desk):
     stem = BallCutter(3e-3).with_stem(desk.bodies.shaft_end)
     world, path = world_of(desk, lambda x, y: -0.02 * np.exp(-((x / 0.008) ** 2)), stem)

@@ -125,7 +125,9 @@ def _least_excess(lacking, count):
     return lacking
 
 
-@pytest.mark.parametrize("number", [2, 6, 11])
+@pytest.mark.parametrize(
+    "number", [pytest.param(2, marks=pytest.mark.slow), pytest.param(6, marks=pytest.mark.slow), 11]
+)
 def test_smooth_axes_ask_no_more_of_axis_and_legs_than_strict_normals(desk, number):
     """Along the finished path, within 10 % of the strict normals' and 1 % of their peak, but for a hundredth of it."""
     assert above_strict(desk, number) < 0.01

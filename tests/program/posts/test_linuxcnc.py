@@ -70,6 +70,7 @@ def test_hal_clips_a_program_beyond_the_limits(tmp_path):
     assert np.abs(before - after).max() > 0.5
 
 
+@pytest.mark.slow
 @real
 def test_the_legs_as_axes_keep_path_and_time(tmp_path):
     what = given(duration=3.0)
@@ -106,16 +107,26 @@ def check_accelerations(legs, what, folder, said):
     assert measured == pytest.approx(commanded, abs=1.0)
 
 
+def unverified(folder):
+    write_post(given(duration=1.0), "linuxcnc", folder, unverified=True)
+    files = [file for file in folder.rglob("*") if file.is_file()]
+    assert all("UNVERIFIED" in "".join(file.read_text().splitlines()[:2]) for file in files)
+
+
+def test_an_unverified_folder_has_its_mark_in_every_file(tmp_path):
+    unverified(tmp_path)
+
+
+@pytest.mark.slow
 @built
 def test_an_unverified_folder_runs_with_its_mark_in_every_file(tmp_path):
-    write_post(given(duration=1.0), "linuxcnc", tmp_path, unverified=True)
-    files = [file for file in tmp_path.rglob("*") if file.is_file()]
-    assert all("UNVERIFIED" in "".join(file.read_text().splitlines()[:2]) for file in files)
+    unverified(tmp_path)
     for part in ("stream", "player", "trivkins", "kinematics"):
         table = play(tmp_path / part)
         assert len(table) > 300
 
 
+@pytest.mark.slow
 @real
 def test_what_linuxcnc_refuses_is_said(tmp_path):
     post(given(duration=0.5), "linuxcnc", tmp_path)

@@ -20,6 +20,7 @@ from pentapod.machine import Machine
 from pentapod.program.posts import PostInput
 from short_motion import motion, placed, post
 
+pytestmark = pytest.mark.slow
 MM, UM = 1e3, 1e6
 BOUND_MM = 0.5
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 from hashlib import sha256
 from textwrap import dedent
 
@@ -90,10 +91,9 @@ def test_one_byte_of_the_program_undoes_its_verdict(folder, capsys):
     assert not (folder / "again").exists()
 
 
-def test_a_run_is_posted_as_it_was_planned(make_job, tmp_path, capsys):
+def test_a_run_is_posted_as_it_was_planned(usual_run, tmp_path, capsys):
     """A program that its own run judged; not when its verdict or itself is of another run."""
-    job, out = make_job(), tmp_path / "out"
-    assert run(["plan", str(job), "-o", str(out), "--quiet"]) == 0
+    job, out = usual_run[0].path, shutil.copytree(usual_run[1], tmp_path / "out")
     assert run(["post", str(out / "program.csv"), "--to", "linuxcnc", "-o", str(tmp_path / "posted")]) == 0
     assert (tmp_path / "posted" / "kinematics" / "play.sh").is_file()
     # Alone, it is judged anew.
@@ -119,7 +119,8 @@ def test_a_run_is_posted_as_it_was_planned(make_job, tmp_path, capsys):
 
 
 def test_the_run_tells_the_machine_that_has_another_tool(make_job, tmp_path, capsys):
-    job, out = make_job(("diameter_mm = 10", "diameter_mm = 10\nlength_mm = 205")), tmp_path / "out"
+    coarse = "stepover_mm = 15\nspacing_mm = 4", "stepover_mm = 30\nspacing_mm = 8"
+    job, out = make_job(("diameter_mm = 10", "diameter_mm = 10\nlength_mm = 205"), coarse), tmp_path / "out"
     assert run(["plan", str(job), "-o", str(out), "--quiet"]) == 0
     words = ["post", str(out / "program.csv"), "--to", "linuxcnc", "-o", str(tmp_path / "posted")]
     assert run(words) == 0

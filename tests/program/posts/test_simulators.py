@@ -85,7 +85,7 @@ def test_loops_of_sdf_close_at_the_rows(name, tmp_path):
 @pytest.mark.skipif(
     shutil.which("ign") is None, reason="Debian's packages ignition-tools and libsdformat-dev are not installed"
 )
-@pytest.mark.parametrize("name", ["desk", "prpu", "as built"])
+@pytest.mark.parametrize("name", ["desk", *(pytest.param(n, marks=pytest.mark.slow) for n in ("prpu", "as built"))])
 def test_sdf_is_valid_to_the_parser_of_gazebo(name, tmp_path):
     """libsdformat checks schema, names, frames and joints; what it prints again closes too."""
     what = made(name, 0.1)

@@ -60,7 +60,7 @@ def test_short_straight_path_takes_the_time_of_four_phases(length, j):
     assert expected < trajectory.duration < (1.02 + 1.5 / count) * expected
 
 
-@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+@pytest.mark.parametrize("interpolation", [pytest.param("linear", marks=pytest.mark.slow), "cubic"])
 @pytest.mark.parametrize("name", PATHS)
 def test_sampled_program_keeps_every_limit(name, interpolation):
     m = machine(interpolation=interpolation)

@@ -23,7 +23,7 @@ def timed(name, acceleration, jerk):
 
 
 @pytest.mark.parametrize("name", ["nod", "raster"])
-@pytest.mark.parametrize("jerk", [200.0, 1000.0])
+@pytest.mark.parametrize("jerk", [200.0, pytest.param(1000.0, marks=pytest.mark.slow)])
 def test_durations_do_not_rise_with_the_acceleration_limit(name, jerk):
     durations = np.array([timed(name, a, jerk) for a in (5.0, 20.0, 50.0)])
     assert (np.diff(durations) <= 1e-3 * durations[:-1] + PERIOD).all()

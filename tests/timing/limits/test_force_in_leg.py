@@ -114,6 +114,7 @@ def test_a_force_that_the_weight_alone_exceeds_is_refused():
     assert result.diagnosis[0].constraint.startswith("force in leg")
 
 
+@pytest.mark.slow
 def test_an_override_keeps_a_limit_that_was_added():
     limit, m = ForceInLeg(2.0, 1.0, 15.0), machine(interpolation="cubic")
     trajectory = timed(Path((PATHS["raster"](),)), m, limits=(limit,))
@@ -124,7 +125,9 @@ def test_an_override_keeps_a_limit_that_was_added():
         assert np.abs(forces(limit, turned, t)).max() <= limit.most * 1.001
 
 
-def test_job_with_an_added_limit_is_timed_explained_and_judged(tmp_path):
+@pytest.fixture
+def planned(tmp_path):
+    """Plan the usual job with a limit, and judge it by another: the outcome, and the limit's certificate."""
     (tmp_path / "part.stl").write_bytes(dome_stl(cells=12))
     (tmp_path / "job.toml").write_text(job_text(), encoding="utf-8")
     job = Job.load(tmp_path / "job.toml")
@@ -133,12 +136,22 @@ def test_job_with_an_added_limit_is_timed_explained_and_judged(tmp_path):
         outcome = run(job, tmp_path / "out", limits=(limit,), claims=(Claim("force in leg", claim.judge),))
         return outcome, {c.claim: c for c in outcome.verdict.certificates}["force in leg"]
 
-    loose, tight = ForceInLeg(2.0, 1.0, 1e3), ForceInLeg(2.0, 1.0, 16.0)
-    outcome, certificate = planned(tight, tight)
+    return planned
+
+
+LOOSE, TIGHT = ForceInLeg(2.0, 1.0, 1e3), ForceInLeg(2.0, 1.0, 16.0)
+
+
+def test_job_with_an_added_limit_is_timed_explained_and_judged(planned):
+    outcome, certificate = planned(TIGHT, TIGHT)
     assert outcome.passed, str(outcome.verdict)
-    assert 0.95 * tight.most < certificate.value <= tight.most
+    assert 0.95 * TIGHT.most < certificate.value <= TIGHT.most
     assert any(cause.name.startswith("force in leg") for cause in outcome.find(Explanation).causes)
     assert "force in leg" in str(outcome.find(Explanation))
-    outcome, certificate = planned(loose, tight)
+
+
+@pytest.mark.slow
+def test_job_that_does_not_keep_a_limit_that_is_judged_fails(planned):
+    outcome, certificate = planned(LOOSE, TIGHT)
     assert not outcome.passed
     assert not certificate.passed

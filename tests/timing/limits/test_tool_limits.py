@@ -107,6 +107,7 @@ def test_tool_limits_far_away_change_no_bit():
     assert timed(path, machine(**far)).duration == timed(path, machine()).duration
 
 
+@pytest.mark.slow
 def test_override_keeps_tool_limits():
     m = machine(interpolation="cubic", max_tip_acceleration=1.0, max_axis_acceleration=30.0)
     path = Path((Piece(by_tip(circle(0.05), nodding(0.05, 0.1)), 0.25, 0.1),))

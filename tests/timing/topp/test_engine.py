@@ -37,6 +37,7 @@ def test_failures_are_values_and_silent(caplog, recwarn):
     assert not recwarn.list
 
 
+@pytest.mark.slow
 def test_ceiling_is_the_largest_x_with_a_common_acceleration():
     rng = np.random.default_rng(3)
     fast, hard = rng.uniform(0.1, 1, 5), rng.uniform(1, 9, 5)

@@ -75,25 +75,18 @@ def ridges(kind, mesh, toolpath, count):
     return low
 
 
-FEW, MANY = 12_000, 20_000  # of few points chance can put more than 0.1 % where an offset's fronts turn a corner
-QUICK = {("torus", RasterOptions), ("cylinder", RasterOptions)}
+POINTS = 20_000  # of few points chance can put more than 0.1 % where an offset's fronts turn a corner
 
 
-@pytest.mark.parametrize(
-    ("kind", "options"),
-    [
-        pytest.param(kind, options, marks=() if (kind, options) in QUICK else pytest.mark.slow)
-        for kind in SHAPES
-        for options in (RasterOptions, OffsetOptions, SpiralOptions)
-    ],
-)
+@pytest.mark.slow  # in the fast lane: scallops on slopes, test_raster.py
+@pytest.mark.parametrize("options", [RasterOptions, OffsetOptions, SpiralOptions])
+@pytest.mark.parametrize("kind", SHAPES)
 def test_scallops_are_as_high_as_asked_for(kind, options):
     """The highest ridge within a tenth below and a twentieth above; facets sag by less than a hundredth of that."""
     mesh = Mesh.of(*SHAPES[kind]())
     told = options(scallop=SCALLOP, region=UPPER, spacing=1e-3, chordal=2e-6)
     toolpath, _ = toolpath_with_report(mesh, BallCutter(RADIUS), told)
-    points = FEW if (kind, options) in QUICK else MANY
-    high = np.quantile(ridges(kind, mesh, toolpath, points), 0.999)
+    high = np.quantile(ridges(kind, mesh, toolpath, POINTS), 0.999)
     assert 0.9 * SCALLOP <= high <= 1.05 * SCALLOP
 
 

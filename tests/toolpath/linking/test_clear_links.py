@@ -117,6 +117,7 @@ def test_a_tool_along_a_wall_leaves_it_without_a_rapid_that_touches():
     assert report.stuck == 0
 
 
+@pytest.mark.slow
 def test_a_cut_in_a_closed_chamber_is_dropped_and_told():
     walls = [((-40, -40, 0), (-30, 40, 20)), ((30, -40, 0), (40, 40, 20)), ((-30, -40, 0), (30, -30, 20))]
     walls += [((-30, 30, 0), (30, 40, 20)), ((-40, -40, 20), (40, 40, 30))]

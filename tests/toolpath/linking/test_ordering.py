@@ -38,6 +38,7 @@ def test_tour_of_a_few_lines_against_all_orders(seed, count):
     assert best - 1e-9 <= found <= 1.3 * best + 1e-9
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_tour_of_many_lines_is_near_the_bound(seed):

@@ -10,7 +10,6 @@ from pentapod.job.build.toolpath import job_toolpath
 
 R, STEPOVER, CHORDAL = 3e-3, 4e-3, 1e-5
 MOST_BEYOND = {"raster": 1e-3, "offset": 5e-3, "spiral": 5e-3}
-QUICK = ("stairs", "crossing_slots")
 
 
 def measured(name, strategy, parts=None) -> tuple[Left, Reachable]:
@@ -36,7 +35,7 @@ def holds(found: Left, reachable: Reachable, strategy: str):
     assert found.lifts <= 1 + reachable.regions(np.radians(90.0))
 
 
-@pytest.mark.parametrize("name", QUICK)
+@pytest.mark.parametrize("name", ["stairs", pytest.param("crossing_slots", marks=pytest.mark.slow)])
 def test_raster_leaves_what_the_ball_forbids(name):
     holds(*measured(name, "raster"), "raster")
 

@@ -11,6 +11,7 @@ from pentapod.toolpath.surfaces.part_surface import PartSurface
 BALL = BallCutter(3e-3)
 STEP = 4e-3
 UP = np.array([0.0, 0.0, 1.0])
+slow = pytest.mark.slow
 
 
 def plate(aspect, facets, size=0.04):
@@ -33,7 +34,9 @@ def turns(points):
     return (along[1:] * along[:-1]).sum(axis=1)
 
 
-@pytest.mark.parametrize(("aspect", "facets"), [(1, 600), (10, 400), (30, 900)])
+@pytest.mark.parametrize(
+    ("aspect", "facets"), [(1, 600), *(pytest.param(*each, marks=slow) for each in ((10, 400), (30, 900)))]
+)
 def test_offsets_of_a_circle_are_circles_on_thin_facets(aspect, facets):
     turn = np.linspace(0, 2 * np.pi, 200)
     curve = np.stack([0.02 + 3.5e-3 * np.cos(turn), 0.02 + 3.5e-3 * np.sin(turn), 0 * turn], 1)
@@ -48,7 +51,9 @@ def test_offsets_of_a_circle_are_circles_on_thin_facets(aspect, facets):
     assert set(range(6)) <= set(passes.levels.tolist())
 
 
-@pytest.mark.parametrize(("aspect", "facets"), [(3, 500), (10, 400), (30, 900)])
+@pytest.mark.parametrize(
+    ("aspect", "facets"), [(3, 500), *(pytest.param(*each, marks=slow) for each in ((10, 400), (30, 900)))]
+)
 def test_offsets_of_the_border_are_squares_on_thin_facets(aspect, facets):
     passes = offset_paths(PartSurface(plate(aspect, facets), BALL, UP), OffsetOptions(stepover=STEP)).passes
     for k, level in enumerate(passes.levels):
@@ -60,8 +65,8 @@ def test_offsets_of_the_border_are_squares_on_thin_facets(aspect, facets):
         assert (turns(passes.points[passes.rows(k)]) > np.cos(np.radians(120))).all()
 
 
-def test_a_spiral_on_thin_facets_has_no_reversal():
-    for form in ("offset", "planar"):
-        passes = spiral_paths(PartSurface(plate(10, 400), BALL, UP), SpiralOptions(stepover=STEP, form=form)).passes
-        longest = int(passes.lengths.argmax())
-        assert (turns(passes.points[passes.rows(longest)]) > np.cos(np.radians(120))).all()
+@pytest.mark.parametrize("form", [pytest.param("offset", marks=slow), "planar"])
+def test_a_spiral_on_thin_facets_has_no_reversal(form):
+    passes = spiral_paths(PartSurface(plate(10, 400), BALL, UP), SpiralOptions(stepover=STEP, form=form)).passes
+    longest = int(passes.lengths.argmax())
+    assert (turns(passes.points[passes.rows(longest)]) > np.cos(np.radians(120))).all()

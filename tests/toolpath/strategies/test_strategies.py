@@ -147,12 +147,24 @@ IN_THE_HOLE = {(name, "torus") for name in ("curves", "text", "drawing", "image"
 """What is laid in the middle of a torus meets nothing; on its ring it does."""
 
 
+slow = pytest.mark.slow
 ON_PARTS = sorted(set(STRATEGIES) - {"pencil"})
 """Strategies that draw on the part itself for a tool that does not roll."""
 
 
-@pytest.mark.parametrize("part", ["waves", "ball", "torus", "box", "bumps"])
-@pytest.mark.parametrize("name", ON_PARTS)
+def grid(names, parts, quick):
+    """All pairs of strategy and part; those of a strategy that has quick parts are slow on all others."""
+    pairs = [(name, part, name not in quick or part in quick[name]) for name in names for part in parts]
+    return [pytest.param(*pair, marks=() if fast else slow, id="-".join(pair)) for *pair, fast in pairs]
+
+
+PARTS = ["waves", "ball", "torus", "box", "bumps"]
+QUICK_PARTS = {"raster": ["box", "bumps"], "cross-hatch": ["box", "bumps"], "waterline": ["box", "waves"],
+               "offset": ["box"], "spiral": ["box", "bumps"]}  # fmt: skip
+QUICK_FOR_BALLS = {"raster": ["waves", "bumps"], "waterline": ["waves"], "offset": ["box"], "spiral": []}
+
+
+@pytest.mark.parametrize(("name", "part"), grid(ON_PARTS, PARTS, QUICK_PARTS))
 def test_every_strategy_on_every_generated_part(generated, name, part):
     mesh, tool, options = generated[part], FlatEnd(1e-3), told(0.1)[name]
     if (name, part) in NOTHING_THERE:
@@ -171,8 +183,7 @@ def test_every_strategy_on_every_generated_part(generated, name, part):
         assert coverage(mesh, options, cuts, count=30_000) >= 0.999
 
 
-@pytest.mark.parametrize("part", ["waves", "box", "bumps"])
-@pytest.mark.parametrize("name", ["raster", "waterline", "offset", "spiral"])
+@pytest.mark.parametrize(("name", "part"), grid(QUICK_FOR_BALLS, ["waves", "box", "bumps"], QUICK_FOR_BALLS))
 def test_balls_roll_over_generated_parts(generated, name, part):
     """The ball's centre is a radius from the part at every waypoint of a cut, and never nearer by more than chordal."""
     mesh, options, radius = generated[part], told(0.1)[name], 6e-3
@@ -207,18 +218,11 @@ REAL = [
     "wavy_mesh_with_hole.ply", "facade_infill_open_mid_res.stl", "wavy_vase_open_low_res.stl", "1002_tray_bottom.STL",
     "octagonal_pocket.stl", "fandisk.obj", "torus.STL", "unit_sphere.STL", "busted.STL", "soup.stl", "teapot.stl",
 ]  # fmt: skip
-QUICK = {("offset", "fandisk.obj"), ("spiral", "wavy_mesh_with_hole.ply"), ("curves", "wavy_mesh_with_hole.ply")}
+QUICK_REAL = dict.fromkeys(ON_PARTS, ()) | {"offset": ["fandisk.obj"], "curves": ["wavy_mesh_with_hole.ply"]}
 
 
 @pytest.mark.parts
-@pytest.mark.parametrize(
-    ("name", "part"),
-    [
-        pytest.param(name, part, marks=() if (name, part) in QUICK else pytest.mark.slow)
-        for name in ON_PARTS
-        for part in REAL
-    ],
-)
+@pytest.mark.parametrize(("name", "part"), grid(ON_PARTS, REAL, QUICK_REAL))
 def test_every_strategy_on_every_real_part(parts, name, part):
     """Repaired and brought to 0.1 m. What a part does not show is refused in one line."""
     scale = 0.1 / max(load_mesh(parts / part, "m", repair=True).diagnosis.extents)
@@ -257,6 +261,7 @@ def bumpy_laws(name, seed, exponent):
     assert again.axes.tobytes() == toolpath.axes.tobytes()
 
 
+@slow
 @settings(max_examples=9, deadline=None)
 @given(name=st.sampled_from(ON_PARTS), seed=st.integers(0, 10_000), exponent=st.floats(-3.0, 3.0))
 @example(name="edges", seed=4349, exponent=2.845)  # passes that meet, with axes that do not
@@ -264,7 +269,7 @@ def test_bumpy_grids(name, seed, exponent):
     bumpy_laws(name, seed, exponent)
 
 
-@pytest.mark.slow
+@slow
 @settings(max_examples=120, deadline=None)
 @given(name=st.sampled_from(ON_PARTS), seed=st.integers(0, 10_000), exponent=st.floats(-3.0, 3.0))
 def test_many_bumpy_grids(name, seed, exponent):

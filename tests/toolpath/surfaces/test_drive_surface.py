@@ -100,6 +100,7 @@ def test_links_follow_the_surface_and_are_clear(pocket):
             assert np.linalg.norm(np.diff(link, axis=0), axis=1).sum() <= 2.6 * np.linalg.norm(end - start) + 1e-3
 
 
+@pytest.mark.slow
 def test_passes_over_a_region_are_those_of_the_whole_part():
     """A slot beside a wall and a roof over a part of it: both are beyond the region's box, but bear on its passes."""
     walls = [[(0, 0, 0), (60, 12, 3)], [(0, 0, 3), (8, 12, 6)], [(11, 0, 3), (60, 12, 6)],
@@ -115,6 +116,7 @@ def test_passes_over_a_region_are_those_of_the_whole_part():
         np.testing.assert_array_equal(getattr(found, field), getattr(expected, field))
 
 
+@pytest.mark.slow
 def test_a_small_region_of_a_large_part_is_machined():
     """A plate of 3 m: the drive surface of all of it would be too fine. A wall beside the region keeps the ball off."""
     shape = part(blocks([(-1.5, -1.5, -0.02), (1.5, 1.5, 0.0)], [(0.031, -0.1, -0.001), (0.05, 0.1, 0.03)]))

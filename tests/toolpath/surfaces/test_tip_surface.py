@@ -53,7 +53,7 @@ def test_lowered_end_rests_where_another_library_lets_it_rest(tool):
     assert np.abs(heights[met] - expected[met]).max() < 1e-7
 
 
-@pytest.mark.parametrize("tool", [FLAT, BULL], ids=["flat", "bull"])
+@pytest.mark.parametrize("tool", [FLAT, pytest.param(BULL, marks=pytest.mark.slow)], ids=["flat", "bull"])
 def test_end_goes_into_a_pocket_as_far_as_its_shape_allows_and_cuts_into_nothing(tool):
     mesh = part(pocket())
     path = raster(mesh, tool, UP)
@@ -81,7 +81,7 @@ def test_tip_surface_turns_with_part_and_axis():
     assert np.abs(np.abs(inside[inside[:, 2] < 4.001e-3]).max(axis=0)[:2] - [4e-3, 2e-3]).max() < 2e-5
 
 
-@pytest.mark.parametrize("tool", [FLAT, BULL], ids=["flat", "bull"])
+@pytest.mark.parametrize("tool", [FLAT, pytest.param(BULL, marks=pytest.mark.slow)], ids=["flat", "bull"])
 def test_end_on_an_open_cap_keeps_within_its_border(tool):
     """At the border, rounded outwards, a lowered cutter meets nothing."""
     angle, turn = np.meshgrid(np.radians(np.linspace(0.0, 55.0, 12)), np.linspace(0.0, 2.0 * np.pi, 49))

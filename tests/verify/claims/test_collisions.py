@@ -245,7 +245,7 @@ def short(cubic):
     )
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(leg=st.integers(0, 4), share=st.floats(0.2, 1.1), away=st.floats(-0.06, 0.06), radius=st.floats(0.002, 0.02))
 def test_no_proof_of_clearance_where_samples_touch(short, leg, share, away, radius):
     shape = post(beside_leg(short, leg, share, away), radius=radius, height=0.04)

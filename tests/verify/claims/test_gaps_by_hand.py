@@ -224,8 +224,8 @@ def along_a_wall(gap, interpolation):
     return judged(replay, wall, (SHANK,))["tool body clear of the part"]
 
 
-@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
-@pytest.mark.parametrize("short", [20e-6, 5e-6, 2e-6])
+@pytest.mark.parametrize("interpolation", [pytest.param("linear", marks=pytest.mark.slow), "cubic"])
+@pytest.mark.parametrize("short", [20e-6, 5e-6, pytest.param(2e-6, marks=pytest.mark.slow)])
 def test_a_gap_along_a_wall_is_proven_though_the_tool_moves_far_in_a_period(short, interpolation):
     """At the feed the tool moves by 30 µm in a period."""
     found = along_a_wall(-50e-6 + short, interpolation)

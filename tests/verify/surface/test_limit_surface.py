@@ -15,6 +15,7 @@ from pentapod.mesh.query.distance import MeshDistance
 from pentapod.mesh.region import Region
 from pentapod.verify.surface.reachable import nearest_centres
 
+slow = pytest.mark.slow
 R, SIZE = 3e-3, 0.02
 FLOOR = Region(angle=0.5)
 INNER = {"low": R, "high": SIZE - R}
@@ -48,7 +49,9 @@ def test_limit_at_the_foot_of_a_wall_and_in_a_corner_is_that_of_the_ball_there()
     np.testing.assert_allclose(np.linalg.norm(found - points, axis=1), expected, atol=8e-6)
 
 
-@pytest.mark.parametrize("name", ["fillet_below_the_ball", "inward_cone", "ribs"])
+@pytest.mark.parametrize(
+    "name", ["fillet_below_the_ball", *(pytest.param(n, marks=slow) for n in ("inward_cone", "ribs"))]
+)
 def test_nearest_centres_are_as_near_as_those_of_a_drop_cutter(name):
     """The oracle lets a ball down at many places."""
     part = mesh(name)
@@ -101,7 +104,7 @@ def test_what_the_ball_leaves_at_walls_is_told_and_is_not_missed():
     assert shaped(found)[0] == pytest.approx(100.0 * (1.0 - (SIZE - 2.0 * strip) ** 2 / SIZE**2), rel=0.06)
 
 
-@pytest.mark.parametrize("first", [1.5e-3, 2e-3])
+@pytest.mark.parametrize("first", [pytest.param(1.5e-3, marks=slow), 2e-3])
 def test_a_corner_whose_pass_is_left_out_is_missed_with_the_floor_beside_it(first):
     """The next pass, `first` farther from the wall, reaches the floor from √(R² − (R − left)²) beside it on."""
     left, ys = 0.25e-3, np.arange(R, SIZE - R + 1e-9, 0.5e-3)
@@ -189,7 +192,7 @@ def test_a_flat_end_that_must_keep_one_direction_answers_for_no_wall_under_a_led
     assert ("100 % more is hidden by overhangs" in found.method) == (missed == 0.0)
 
 
-@pytest.mark.parametrize(("above", "missed"), [(0.0, 0.0), (1.5e-3, 0.4)])
+@pytest.mark.parametrize(("above", "missed"), [pytest.param(0.0, 0.0, marks=slow), (1.5e-3, 0.4)])
 def test_a_bull_end_leaves_its_fillet_at_the_foot_of_an_outer_wall_and_no_more(above, missed):
     """A tip at the part's lowest point leaves corner − √(corner² − (corner − z)²) beside a wall at a height of z."""
     corner, left, high = 3e-3, 0.25e-3, 3e-3

@@ -101,7 +101,7 @@ def test_passes_on_a_sphere_leave_the_ridge_of_the_law_of_cosines():
     assert not judged(along(*lines, tool=ball, axes=axes), mesh, ball, 0.95 * ridge).passed
 
 
-@pytest.mark.parametrize("make", [FlatEnd, lambda r: BullNose(r, 5e-4)])
+@pytest.mark.parametrize("make", [FlatEnd, pytest.param(lambda r: BullNose(r, 5e-4), marks=pytest.mark.slow)])
 def test_a_flat_end_that_could_clear_a_floor_up_to_the_wall_must(make):
     size, tool, mesh = 0.02, make(R), pocket()
     ends = {"low": R, "high": size - R, "y1": size - R}
@@ -110,6 +110,7 @@ def test_a_flat_end_that_could_clear_a_floor_up_to_the_wall_must(make):
     assert found.value == pytest.approx(100.0 * 2e-3 * size / size**2, rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_share_near_its_bound_is_sampled_more_finely(monkeypatch):
     """With 64 samples chance decides (16 % for 19.1 %); the foot of the walls is left by the ball's shape."""
     size, tool = 0.02, BallCutter(R)
@@ -153,6 +154,7 @@ def test_a_beam_covers_what_is_near_its_lines_on_cuts_alone():
     assert "beam's line" in wide.method
 
 
+@pytest.mark.slow
 def test_dense_samples_agree_on_a_wavy_sheet_with_a_leaning_tool():
     """Heights by brute force: many balls along the path, the first that a ray up the normal meets."""
     rng = np.random.default_rng(5)
@@ -200,6 +202,7 @@ def test_motion_that_is_not_known_exactly_counts_for_less():
     assert judged(replay, plate(), tool, scallop + 6e-5).value == 0.0
 
 
+@pytest.mark.slow
 def test_each_piece_answers_for_its_own_part():
     """Three passes each for two set-ups; a piece without one of its passes fails, whatever the other does."""
     tool, lines = BallCutter(R), [line[1:3] for line in raster(2e-3)]

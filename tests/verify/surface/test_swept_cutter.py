@@ -35,7 +35,7 @@ def is_inside(points, start, way, axis):
     return inside
 
 
-@pytest.mark.parametrize("most", [9e-4, 6e-3])
+@pytest.mark.parametrize("most", [9e-4, pytest.param(6e-3, marks=pytest.mark.slow)])
 def test_rays_enter_where_the_cylinder_is_first_and_not_before(most):
     rng = np.random.default_rng(5)
     solid, start, way, axis = swept(60, rng)
