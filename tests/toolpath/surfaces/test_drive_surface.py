@@ -15,8 +15,8 @@ from pentapod.toolpath import PencilOptions, SegmentKind, make_toolpath
 from pentapod.toolpath.strategies.raster import raster_paths
 from pentapod.toolpath.surfaces.ball_centres import smoothed
 from pentapod.toolpath.surfaces.drive_surface import DriveSurface
+from pentapod.toolpath.surfaces.options import DriveOptions, OverhangOptions
 from pentapod.toolpath.surfaces.part_surface import PartSurface
-from pentapod.toolpath.surfaces.places import DriveOptions
 
 R, CHORDAL, UP = 3e-3, 5e-6, np.array([0.0, 0.0, 1.0])
 
@@ -163,7 +163,7 @@ def test_no_link_leaves_the_region_or_is_too_long(post):
     pair = {1: (ends[0], ends[1])}
     assert post.links(pair, RasterOptions(stepover=2e-3), 2e-3)
     assert not post.links(pair, RasterOptions(stepover=2e-3, region=Region(angle=np.radians(80.0))), 2e-3)
-    lazy = replace(post, centres=replace(post.centres, options=replace(post.options, around=0.5)))
+    lazy = replace(post, options=replace(post.options, around=0.5))
     assert not lazy.links(pair, RasterOptions(stepover=2e-3), 2e-3)
 
 
@@ -190,7 +190,7 @@ def test_no_link_leads_under_what_hides_the_surface(bridge):
 def test_passes_go_on_to_where_the_part_begins_to_hide_them(bridge, under):
     """As seen from above a ball is hidden from a radius beside the slab on; walls that lean under a little are not."""
     tool, edge = BallCutter(R), 15e-3 - R
-    leans = {None: DriveOptions().sideways * R, 0.0: DriveOptions().upright * R, 0.3e-3: 0.3e-3}[under]
+    leans = {None: OverhangOptions().sideways * R, 0.0: OverhangOptions().upright * R, 0.3e-3: 0.3e-3}[under]
     options = RasterOptions(stepover=2e-3, region=Region(angle=np.radians(30.0)), spacing=4e-3, under=under)
     cuts = [s.tips + R * s.axes for s in make_toolpath(bridge, tool, options).segments if s.kind is SegmentKind.CUT]
     last = np.array([cut[cut[:, 0].argmax()] for cut in cuts])
@@ -267,7 +267,7 @@ def test_axes_along_a_corner_are_midway_between_its_walls(lean):
 
 
 def test_a_part_in_use_has_one_drive_surface_however_far_passes_go_under(pocket):
-    again = DriveSurface.of(pocket.part, R, UP, DriveOptions().leaning(1.0))
+    again = DriveSurface.of(pocket.part, R, UP, DriveOptions(overhangs=OverhangOptions().leaning(1.0)))
     assert again.mesh is pocket.mesh
     assert DriveSurface.of(pocket.part, R, UP, replace(DriveOptions(), step=0.5)).mesh is not pocket.mesh
 

@@ -24,8 +24,8 @@ from pentapod.toolpath.path_report import PathReport
 from pentapod.toolpath.strategy import ContactPaths, Strategy
 from pentapod.toolpath.surface import Surface
 from pentapod.toolpath.surfaces.drive_surface import DriveSurface
+from pentapod.toolpath.surfaces.options import DriveOptions, OverhangOptions
 from pentapod.toolpath.surfaces.part_surface import PartSurface
-from pentapod.toolpath.surfaces.places import DriveOptions
 from pentapod.toolpath.surfaces.rolled_surface import RolledSurface
 from pentapod.toolpath.surfaces.tip_surface import TipSurface
 from pentapod.toolpath.toolpath import Toolpath
@@ -103,7 +103,8 @@ def surface_for(mesh: Mesh, tool: Tool, options: PathOptions, axis: Floats | Non
     """
     if rolls_over(tool, options):
         under = options.under if isinstance(options, CoverOptions) else None
-        drive = DriveOptions() if under is None else DriveOptions().leaning(under / tool.tilt_centre)
+        overhangs = OverhangOptions() if under is None else OverhangOptions().leaning(under / tool.tilt_centre)
+        drive = DriveOptions(overhangs=overhangs)
         return DriveSurface.of(mesh, tool.tilt_centre, options.up, drive, options.region)
     if axis is not None and isinstance(tool, BullNose) and options.rolls:
         stepover = options.stepover if isinstance(options, CoverOptions) else None

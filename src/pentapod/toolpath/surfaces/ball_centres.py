@@ -16,7 +16,7 @@ from pentapod.mesh.normals import unit_or_zero
 from pentapod.mesh.offset.offset_surface import onto_level
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.query.tree import FacetTree
-from pentapod.toolpath.surfaces.places import DriveOptions, Places
+from pentapod.toolpath.surfaces.places import PlaceOptions, Places
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class BallCentres(Places):
 
     tree: FacetTree
     radius: float
-    options: DriveOptions
+    options: PlaceOptions
 
     def settled(self, points: Floats, towards: Floats) -> tuple[Floats, Bools]:
         """Return points (N, 3) moved onto the offset, and which of them are on it then."""

@@ -23,7 +23,7 @@ from pentapod.mesh.query.tree import FacetTree
 from pentapod.mesh.region import Region
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.surfaces.ball_centres import BallCentres, smoothed
-from pentapod.toolpath.surfaces.places import DriveOptions
+from pentapod.toolpath.surfaces.options import DriveOptions
 from pentapod.toolpath.surfaces.rolled_surface import RolledSurface
 
 _KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, float, int, bytes], tuple[FacetTree, Mesh]]] = WeakKeyDictionary()
@@ -44,6 +44,7 @@ class DriveSurface(RolledSurface):
     mesh: Mesh
     centres: BallCentres
     view: Floats
+    options: DriveOptions
 
     @property
     def places(self) -> BallCentres:
@@ -83,18 +84,18 @@ class DriveSurface(RolledSurface):
         tree, mesh = known[key] = found
         for other in list(known)[:-_KEPT]:
             known.pop(other, None)
-        return cls(part, mesh, BallCentres(tree, radius, options), view)
+        return cls(part, mesh, BallCentres(tree, radius, options.places), view, options)
 
     def hides(self, points: Floats, slack: float) -> Bools:
         """Return whether the drive surface lies above points (N, 3) on it by more than `slack` metres."""
-        return self._hides(points, slack, self.options.sideways)
+        return self._hides(points, slack, self.options.overhangs.sideways)
 
     def _hides(self, points: Floats, slack: float, sideways: float) -> Bools:
-        height = points @ self.view + max(slack, self.options.above * self.radius)
+        height = points @ self.view + max(slack, self.options.overhangs.above * self.radius)
         # Walls and corners along the view do not hide themselves: one of four points around is free, close to the
         # point where a channel is narrow, farther from it where a wall leans under.
         hidden = np.ones(len(points), dtype=np.bool_)
-        for step in (self.options.beside, sideways):
+        for step in (self.options.overhangs.beside, sideways):
             x, y = (step * self.radius * side for side in tangent_frame(self.view))
             around = (0.83 * x + 0.56 * y, 0.56 * x - 0.83 * y)
             for aside in (*around, *(-one for one in around)):
@@ -128,7 +129,7 @@ class DriveSurface(RolledSurface):
         """
         exact = self.centres.exact(passes, options.chordal, min(options.closest, options.chordal))
         exact = self.centres.midway(exact)
-        normals = smoothed(exact, self.options.window * self.radius)
+        normals = smoothed(exact, self.options.places.window * self.radius)
         return replace(exact, points=exact.points - self.radius * normals, normals=normals)
 
     def _seen(self, ways: list[Floats | None], slack: float) -> list[Floats | None]:
@@ -143,9 +144,9 @@ class DriveSurface(RolledSurface):
         begins, points = np.cumsum([0, *(len(way) for way in kept[:-1])]), np.concatenate(kept)
         ends = np.append(begins[1:], len(points)) - 1
         to_ends = [np.minimum(*(np.linalg.norm(way - way[end], axis=1) for end in (0, -1))) for way in kept]
-        apart = np.concatenate(to_ends) > self.options.under * self.radius
-        hidden = np.logical_or.reduceat(self._hides(points, slack, self.options.under) & apart, begins)
-        leant = self._hides(points, slack, self.options.upright)
+        apart = np.concatenate(to_ends) > self.options.overhangs.under * self.radius
+        hidden = np.logical_or.reduceat(self._hides(points, slack, self.options.overhangs.under) & apart, begins)
+        leant = self._hides(points, slack, self.options.overhangs.upright)
         hidden |= np.logical_or.reduceat(leant & apart, begins) & ~leant[begins] & ~leant[ends]
         gone = iter(hidden.tolist())
         return [None if way is None or next(gone) else way for way in ways]

@@ -6,7 +6,7 @@ Which places are clear, and how a place is moved onto the surface, depends on th
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,70 +16,31 @@ from pentapod.mesh.passes import Passes
 
 
 @dataclass(frozen=True)
-class DriveOptions(Value):
-    """How a drive surface is made and used.
+class PlaceOptions(Value):
+    """How places are moved onto a surface, and links judged on it. Shares are of the cutter's radius.
 
-    step: of the grid, as a share of the ball's radius. parts: how many times finer it is in channels between its
-    nodes; narrower ones may be closed. on_level: as a share of the radius, how near to the offset a point is put.
-    rounds: of moving it there, and of halving chords. window: length over which normals are averaged along a line,
-    as a share of the radius: at creases they jump. side: how far beside a line both sides of a corner are looked
-    for, as a share of the radius; corner: angle between them, radians, from which they are two. border: how exactly
-    an open border is known, as a share of the radius; enters: how far beyond it the ball gets where it is no hole.
-    longest: of a link on the surface, as a multiple of the straight way; uneven: of its longest step. around:
-    longest link around what is in the way, as a multiple of the straight way and twice the clearance. beside,
-    sideways: distances around a point at both of which the surface above must hide it, above: by which height, all
-    as shares of the radius: walls, and valleys between steep flanks, do not hide themselves, nor do walls that lean
-    under by less. under: the same as `sideways` for links, which may lead a little farther; upright: and for those
-    between ends over which nothing leans. evened: how often the stepover for a scallop is averaged with that of
-    neighbouring facets, whose curvature is noisy. about: how far beyond what the ball touches in a region's box the
-    surface is made, as a multiple of the radius: links may lead there. region_ends: cosines by which a normal is off
-    the limit of a region where that may end; crease: angle between exact and mean normals, radians, from which
-    there are two; halvings: of an edge, to find where the region ends on it. wall: cosine to a region's direction
-    below which a facet is one of a wall; foot: cosine by which the foot of one is within the region. steep: angle to
-    the axis, radians, from which a face has a foot; rising: least rise of a facet over it, as a share of its height.
-    reach, aside: how far a place of the tip is moved onto its surface from near it, and sideways on a link, as shares
-    of the radius.
+    on_level: how near to the surface a point is put; reach, aside: how far a place of the tip is moved onto its surface
+    from near it, and sideways on a link. rounds: of moving, and of halving chords. longest: of a link on the surface,
+    as a multiple of the straight way; uneven: of its longest step. window: length over which normals are averaged along
+    a line: at creases they jump. side: how far beside a line both sides of a corner are looked for; corner: angle
+    between them, radians, from which they are two.
     """
 
-    step: float = 0.25
-    parts: int = 8
     on_level: float = 1e-7
+    reach: float = 0.25
+    aside: float = 0.5
     rounds: int = 30
+    longest: float = 2.5
+    uneven: float = 3.0
     window: float = 1.0
     side: float = 0.02
     corner: float = float(np.radians(5.0))
-    border: float = 0.02
-    enters: float = 0.5
-    longest: float = 2.5
-    uneven: float = 3.0
-    around: float = 3.0
-    beside: float = 0.01
-    sideways: float = 0.2
-    under: float = 0.3
-    upright: float = 0.01
-    above: float = 0.2
-    evened: int = 2
-    region_ends: float = 0.5
-    crease: float = 0.35
-    halvings: int = 12
-    wall: float = 0.1
-    foot: float = 1e-3
-    steep: float = 0.25 * np.pi
-    rising: float = 0.5
-    about: float = 3.0
-    reach: float = 0.25
-    aside: float = 0.5
-
-    def leaning(self, share: float) -> DriveOptions:
-        """Return options by which the surface may lean over a point by a share of the radius."""
-        sideways = max(share, self.upright)
-        return replace(self, sideways=sideways, under=self.under / self.sideways * sideways)
 
 
 class Places(ABC):
     """Where a cutter may be over a part. options: of moving and halving; radius: of the cutter, metres."""
 
-    options: DriveOptions
+    options: PlaceOptions
     radius: float
 
     @abstractmethod

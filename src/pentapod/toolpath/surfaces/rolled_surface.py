@@ -23,19 +23,21 @@ from pentapod.mesh.topology import components
 from pentapod.toolpath.lines.scallop import surface_steps
 from pentapod.toolpath.options import CoverOptions, PathOptions
 from pentapod.toolpath.surface import Contacts
-from pentapod.toolpath.surfaces.places import DriveOptions, Places
+from pentapod.toolpath.surfaces.options import DriveOptions
+from pentapod.toolpath.surfaces.places import Places
 from pentapod.toolpath.surfaces.ways_around import drawn_taut, shortest_ways
 
 
 class RolledSurface(ABC):
     """Where a cutter is that rolls over a part; mesh: the surface itself, facing outwards.
 
-    centres: of the cutter, as points of the mesh. view (3,): unit, towards the tool.
+    view (3,): unit, towards the tool. options: how the surface was made and is used.
     """
 
     part: Mesh
     mesh: Mesh
     view: Floats
+    options: DriveOptions
     slides = True
     turns = True
 
@@ -90,11 +92,6 @@ class RolledSurface(ABC):
     def radius(self) -> float:
         """Radius of the cutter, metres."""
         return self.places.radius
-
-    @property
-    def options(self) -> DriveOptions:
-        """How the surface is made and used."""
-        return self.places.options
 
     @cached_property
     def field(self) -> HeightField:

@@ -15,7 +15,7 @@ from pentapod.geometry.solids import Solid
 from pentapod.mesh.normals import unit_or_zero
 from pentapod.mesh.offset.tip_surface import Lowered
 from pentapod.mesh.query.swept_depth import TouchingBody, meets
-from pentapod.toolpath.surfaces.places import DriveOptions, Places
+from pentapod.toolpath.surfaces.places import PlaceOptions, Places
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -30,7 +30,7 @@ class TipPlaces(Places):
     lowered: Lowered
     frame: Floats
     radius: float
-    options: DriveOptions
+    options: PlaceOptions
 
     @property
     def axis(self) -> Floats:

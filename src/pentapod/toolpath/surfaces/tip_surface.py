@@ -22,7 +22,7 @@ from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.mesh.region import Region
 from pentapod.toolpath.options import PathOptions
-from pentapod.toolpath.surfaces.places import DriveOptions
+from pentapod.toolpath.surfaces.options import DriveOptions
 from pentapod.toolpath.surfaces.rolled_surface import RolledSurface
 from pentapod.toolpath.surfaces.tip_places import TipPlaces
 
@@ -39,6 +39,7 @@ class TipSurface(RolledSurface):
     mesh: Mesh
     tips: TipPlaces
     view: Floats
+    options: DriveOptions
     turns = False
 
     @property
@@ -70,7 +71,7 @@ class TipSurface(RolledSurface):
             source = part.diagnosis.source
             known[key] = lowered, Mesh.of(vertices @ frame, faces, source=source, crease_angle=np.pi)
         lowered, mesh = known[key]
-        return cls(part, mesh, TipPlaces(lowered, frame, tool.radius, options), view)
+        return cls(part, mesh, TipPlaces(lowered, frame, tool.radius, options.places), view, options)
 
     def hides(self, points: Floats, slack: float) -> Bools:
         """Return False: along the axis nothing lies above the surface."""
@@ -111,12 +112,12 @@ class TipSurface(RolledSurface):
     @property
     def _lowest(self) -> float:
         """Height along the axis, metres, to which the surface reaches down."""
-        return float((self.part.vertices @ self.tips.axis).min()) - self.options.on_level * self.radius
+        return float((self.part.vertices @ self.tips.axis).min()) - self.options.places.on_level * self.radius
 
     def feet(self, patch: Patch) -> Bools:
         """Return which edges (E,) of a patch are the lowest of steep faces: the end cuts above its tip alone."""
         topology, axis, heights = patch.topology, self.tips.axis, patch.vertices @ self.tips.axis
-        low = heights < self._lowest + self.options.on_level * self.radius
+        low = heights < self._lowest + self.options.places.on_level * self.radius
         lowest = np.flatnonzero(low[topology.edges].all(axis=1))
         # A steep face rises from its foot.
         ends = heights[topology.edges].mean(axis=1)[topology.edge_of_side]

@@ -1,0 +1,67 @@
+"""Options of the surfaces on which a cutter rolls over a part. Shares are of the cutter's radius."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pentapod.base.values import Value
+from pentapod.toolpath.surfaces.places import PlaceOptions
+
+
+@dataclass(frozen=True)
+class OverhangOptions(Value):
+    """When the surface above a point hides it.
+
+    beside, sideways: distances around the point, shares, at both of which the surface must be above it; above: by which
+    height, a share: walls, and valleys between steep flanks, do not hide themselves, nor do walls that lean under by
+    less. under: the same as `sideways` for links, which may lead a little farther; upright: and for those between ends
+    over which nothing leans.
+    """
+
+    beside: float = 0.01
+    sideways: float = 0.2
+    under: float = 0.3
+    upright: float = 0.01
+    above: float = 0.2
+
+    def leaning(self, share: float) -> OverhangOptions:
+        """Return options by which the surface may lean over a point by a share of the radius."""
+        sideways = max(share, self.upright)
+        return replace(self, sideways=sideways, under=self.under / self.sideways * sideways)
+
+
+@dataclass(frozen=True)
+class DriveOptions(Value):
+    """How the surface is made, and where it and a region of it end.
+
+    step: of the grid, a share. parts: how many times finer it is in channels between its nodes; narrower ones may be
+    closed. border: how exactly an open border is known, a share; enters: how far beyond it the ball gets where it is no
+    hole. around: longest link around what is in the way, as a multiple of the straight way and twice the clearance.
+    evened: how often the stepover for a scallop is averaged with that of neighbouring facets, whose curvature is noisy.
+    about: how far beyond what the ball touches in a region's box the surface is made, as a multiple of the radius:
+    links may lead there. region_ends: cosines by which a normal is off the limit of a region where that may end;
+    crease: angle between exact and mean normals, radians, from which there are two; halvings: of an edge, to find where
+    the region ends on it. wall: cosine to a region's direction below which a facet is one of a wall; foot: cosine by
+    which the foot of one is within the region. steep: angle to the axis, radians, from which a face has a foot;
+    rising: least rise of a facet over it, as a share of its height. overhangs: what hides a point. places: how they are
+    moved onto the surface.
+    """
+
+    step: float = 0.25
+    parts: int = 8
+    border: float = 0.02
+    enters: float = 0.5
+    around: float = 3.0
+    evened: int = 2
+    about: float = 3.0
+    region_ends: float = 0.5
+    crease: float = 0.35
+    halvings: int = 12
+    wall: float = 0.1
+    foot: float = 1e-3
+    steep: float = 0.25 * np.pi
+    rising: float = 0.5
+    overhangs: OverhangOptions = field(default_factory=OverhangOptions)
+    places: PlaceOptions = field(default_factory=PlaceOptions)
