@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.query.ball_kernels import facet_distance
+from pentapod.mesh.query.kernels.ball_kernels import facet_distance
 from pentapod.mesh.query.tree import FacetTree
 
 

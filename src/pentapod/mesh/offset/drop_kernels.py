@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.mesh.query.segment_kernels import STACK
+from pentapod.mesh.query.kernels.segment_kernels import STACK
 from pentapod.numerics.kernels import kernel
 
 _ROUNDS = 50

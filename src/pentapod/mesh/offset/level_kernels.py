@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.mesh.query.ball_kernels import facet_distance
-from pentapod.mesh.query.segment_kernels import STACK, closest
+from pentapod.mesh.query.kernels.ball_kernels import facet_distance
+from pentapod.mesh.query.kernels.segment_kernels import STACK, closest
 from pentapod.numerics.kernels import kernel
 
 _MOST = 8

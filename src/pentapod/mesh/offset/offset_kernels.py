@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
-from pentapod.mesh.query.segment_kernels import STACK, closest
+from pentapod.mesh.query.kernels.segment_kernels import STACK, closest
 from pentapod.numerics.kernels import kernel
 
 _ROUNDS = 60

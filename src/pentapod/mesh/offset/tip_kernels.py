@@ -8,7 +8,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.mesh.offset.drop_kernels import drop
-from pentapod.mesh.query.segment_kernels import STACK
+from pentapod.mesh.query.kernels.segment_kernels import STACK
 from pentapod.numerics.kernels import kernel
 
 _FLAT = 0.7

@@ -165,7 +165,7 @@ class MeshDistance:
 
     def _nearest(self, starts: Floats, travels: Floats, within: float) -> tuple[Floats, Floats, Floats, Ints]:
         """Return distances, shares of the travels, offsets from the mesh, and facets in tree order (−1: too far)."""
-        from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415  loads numba
+        from pentapod.mesh.query.kernels.segment_kernels import nearest_all  # noqa: PLC0415  loads numba
 
         count = len(starts)
         distance, where = np.full(count, within), np.zeros((count, 4))

@@ -94,7 +94,7 @@ class HeightField:
 
     def _topmost(self, points: Floats, margin: float) -> tuple[Floats, Ints, Floats]:
         """Return heights (N,) as `topmost`, the facets (N,) there, −1 for none, and the weights (N, 3) on them."""
-        from pentapod.mesh.query.heightfield_kernels import topmost_facets  # noqa: PLC0415  loads numba
+        from pentapod.mesh.query.kernels.heightfield_kernels import topmost_facets  # noqa: PLC0415  loads numba
 
         local, count = points @ self._frame.T, len(points)
         heights, facets, weights = np.empty(count), np.empty(count, dtype=np.intp), np.empty((count, 3))

@@ -126,8 +126,8 @@ def is_clear(tree: FacetTree, tool: Body, tips: Floats, axes: Floats, *, thresho
 
 def _met(tree: FacetTree, solids: tuple[Solid, ...], motions: Floats, tilt_centre: float, threshold: float) -> Bools:
     """Return on which motions (M, 18) one of the solids is deeper than `threshold`."""
-    from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415 - loads numba
-    from pentapod.mesh.query.sweep_kernels import sweep_all  # noqa: PLC0415
+    from pentapod.mesh.query.kernels.segment_kernels import nearest_all  # noqa: PLC0415 - loads numba
+    from pentapod.mesh.query.kernels.sweep_kernels import sweep_all  # noqa: PLC0415
 
     met = np.zeros(len(motions), dtype=np.bool_)
     hierarchy = (tree.corners, tree.boxes, tree.starts)
@@ -171,9 +171,9 @@ def _swept(
     resolution: float,
     progress: Progress,
 ) -> Sweep:
-    from pentapod.mesh.query.facet_kernels import RELATIVE_ERROR  # noqa: PLC0415
-    from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415 - loads numba
-    from pentapod.mesh.query.sweep_kernels import sweep_all  # noqa: PLC0415
+    from pentapod.mesh.query.kernels.facet_kernels import RELATIVE_ERROR  # noqa: PLC0415
+    from pentapod.mesh.query.kernels.segment_kernels import nearest_all  # noqa: PLC0415 - loads numba
+    from pentapod.mesh.query.kernels.sweep_kernels import sweep_all  # noqa: PLC0415
 
     solids = tool.solids
     motions = _motions(start, end, tool.tilt_centre)

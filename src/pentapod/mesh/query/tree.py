@@ -42,7 +42,7 @@ class FacetTree:
         """Return the tree of a mesh's facets, made once for each mesh."""
         if (known := _MADE.get(mesh)) is not None:
             return known
-        from pentapod.mesh.query.box_kernels import fit_boxes, split_by_medians  # noqa: PLC0415 - loads numba
+        from pentapod.mesh.query.kernels.box_kernels import fit_boxes, split_by_medians  # noqa: PLC0415 - loads numba
 
         order = np.arange(len(mesh.faces), dtype=np.intp)
         leaves = 1 << max(0, (len(order) // FACETS_PER_LEAF).bit_length() - 1)
@@ -57,7 +57,7 @@ class FacetTree:
     @cached_property
     def extents(self) -> Floats:
         """Lowest and highest coordinates (2 L − 1, 2, 3) of each node: the boxes that points search."""
-        from pentapod.mesh.query.box_kernels import fit_extents  # noqa: PLC0415 - loads numba
+        from pentapod.mesh.query.kernels.box_kernels import fit_extents  # noqa: PLC0415 - loads numba
 
         extents = np.empty((len(self.boxes), 2, 3))
         fit_extents(self.corners, self.starts, extents)
@@ -68,7 +68,7 @@ class FacetTree:
 
         What is no nearer than `within` metres counts as that far, with the facet −1.
         """
-        from pentapod.mesh.query.segment_kernels import closest_of_all  # noqa: PLC0415 - loads numba
+        from pentapod.mesh.query.kernels.segment_kernels import closest_of_all  # noqa: PLC0415 - loads numba
 
         distances, away = np.empty(len(points)), np.empty((len(points), 3))
         facets = np.empty(len(points), dtype=np.intp)
@@ -78,7 +78,7 @@ class FacetTree:
 
     def within(self, points: Floats, distance: float) -> Bools:
         """Return which points (M, 3) are nearer to the mesh than `distance` metres."""
-        from pentapod.mesh.query.segment_kernels import all_within  # noqa: PLC0415 - loads numba
+        from pentapod.mesh.query.kernels.segment_kernels import all_within  # noqa: PLC0415 - loads numba
 
         found = np.empty(len(points), dtype=np.bool_)
         given = (distance, self.corners, self.starts, self.extents)
@@ -87,7 +87,7 @@ class FacetTree:
 
     def clear(self, starts: Floats, ends: Floats, least: float) -> Bools:
         """Return which chords (M,) are nowhere nearer to the mesh than `least` metres."""
-        from pentapod.mesh.query.segment_kernels import nearest_all  # noqa: PLC0415 - loads numba
+        from pentapod.mesh.query.kernels.segment_kernels import nearest_all  # noqa: PLC0415 - loads numba
 
         count = len(starts)
         distances, where, facets = np.empty(count), np.empty((count, 4)), np.empty(count, dtype=np.intp)

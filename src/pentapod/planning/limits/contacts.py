@@ -198,7 +198,7 @@ def _with_gaps(gaps: Floats, cap: float) -> Floats:
 
 def _tool(obstacle: Obstacle, solids: tuple[Solid, ...], bodies: MovingBodies, cap: float, *, numbers: bool) -> Floats:
     """Return for the tool body the gaps, at most `cap`, and the numbers of its contacts (N, 1 + NUMBERS)."""
-    from pentapod.mesh.query.body_kernels import normals_of_all  # noqa: PLC0415  loads numba
+    from pentapod.mesh.query.kernels.body_kernels import normals_of_all  # noqa: PLC0415  loads numba
 
     gaps, points = obstacle.surface.bodies(solids, bodies.tips, bodies.axes, cap)
     gaps = np.minimum(gaps + obstacle.allowance, cap)

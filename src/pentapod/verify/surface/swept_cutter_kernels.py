@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.mesh.query.box_kernels import open_node
+from pentapod.mesh.query.kernels.box_kernels import open_node
 from pentapod.numerics.kernels import kernel
 
 STACK = 128

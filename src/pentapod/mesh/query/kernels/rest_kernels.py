@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from pentapod.base.arrays import Floats
-from pentapod.mesh.query.body_kernels import meridian_distance
+from pentapod.mesh.query.kernels.body_kernels import meridian_distance
 from pentapod.numerics.kernels import kernel
 
 STEPS = 24
@@ -26,15 +26,16 @@ ALIKE = 1e-9
 @kernel
 def into_frame(motion: Floats, corners: Floats, own: Floats) -> None:
     """Write the corners (3, 3) of a facet into own (3, 3), in the frame of a solid at rest: its tip and its axis, z."""
+    up, aside = motion[3:6], motion[9:12]
     for k in range(3):
         x, y, z = corners[k, 0] - motion[0], corners[k, 1] - motion[1], corners[k, 2] - motion[2]
-        own[k, 0] = x * motion[9] + y * motion[10] + z * motion[11]
+        own[k, 0] = x * aside[0] + y * aside[1] + z * aside[2]
         own[k, 1] = (
-            x * (motion[4] * motion[11] - motion[5] * motion[10])
-            + y * (motion[5] * motion[9] - motion[3] * motion[11])
-            + z * (motion[3] * motion[10] - motion[4] * motion[9])
+            x * (up[1] * aside[2] - up[2] * aside[1])
+            + y * (up[2] * aside[0] - up[0] * aside[2])
+            + z * (up[0] * aside[1] - up[1] * aside[0])
         )
-        own[k, 2] = x * motion[3] + y * motion[4] + z * motion[5] + motion[17]
+        own[k, 2] = x * up[0] + y * up[1] + z * up[2] + motion[17]
 
 
 @kernel

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.mesh.query.body_kernels import (
+from pentapod.mesh.query.kernels.body_kernels import (
     RATE,
     VALUE,
     above_base,
@@ -28,8 +28,8 @@ from pentapod.mesh.query.body_kernels import (
     lowest_on_way,
     pose_at,
 )
-from pentapod.mesh.query.box_kernels import box_radius
-from pentapod.mesh.query.facet_kernels import (
+from pentapod.mesh.query.kernels.box_kernels import box_radius
+from pentapod.mesh.query.kernels.facet_kernels import (
     RELATIVE_ERROR,
     STACK,
     WORK,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.mesh.query.body_kernels import (
+from pentapod.mesh.query.kernels.body_kernels import (
     RATE,
     VALUE,
     above_base,
@@ -16,7 +16,7 @@ from pentapod.mesh.query.body_kernels import (
     lowest_on_way,
     pose_at,
 )
-from pentapod.mesh.query.rest_kernels import into_frame, lowest_on_facet, told_at_once
+from pentapod.mesh.query.kernels.rest_kernels import into_frame, lowest_on_facet, told_at_once
 from pentapod.numerics.kernels import kernel
 
 STACK = 512

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
-from pentapod.mesh.query.ball_kernels import (
+from pentapod.mesh.query.kernels.ball_kernels import (
     EXACT_M,
     ROUNDS,
     facet_distance,
@@ -21,7 +21,7 @@ from pentapod.mesh.query.ball_kernels import (
     nearest_time,
     slope,
 )
-from pentapod.mesh.query.box_kernels import box_radius, open_node
+from pentapod.mesh.query.kernels.box_kernels import box_radius, open_node
 from pentapod.numerics.kernels import kernel
 
 STACK = 128
