@@ -30,7 +30,7 @@ test: $(READY)  ## the fast suite; kernels are compiled before, on all cores
 
 test-all: $(READY)  ## everything, the long forms too
 	$(BIN)/pentapod warm-up
-	$(BIN)/pytest $(SPREAD)
+	PENTAPOD_TESTS=all $(BIN)/pytest $(SPREAD)
 
 test-lowest:  ## a part of the fast suite with the lowest versions that pyproject.toml allows, in an environment of its own
 	rm -rf out/lowest && $(PYTHON) -m venv out/lowest

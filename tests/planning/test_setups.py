@@ -7,6 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from lengths import examples
 from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.planning.setups import setups
 from pentapod.toolpath.linking.links import LinkStyle
@@ -63,7 +64,7 @@ def assert_all_cuts_once(path: Toolpath, pieces) -> None:
     np.testing.assert_array_equal(times, cutting_intervals(path))
 
 
-@settings(max_examples=15)
+@settings(max_examples=examples(15, 60))
 @given(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=9), st.floats(0.05, 0.9))
 def test_no_split_between_passes_has_fewer_pieces(places, width):
     path, fits = passes(places), no_wider(np.inf, width)

@@ -19,6 +19,7 @@ from timing_paths import (
     used_by_rows,
 )
 
+from lengths import examples
 from pentapod.base.errors import InputError
 from pentapod.base.refusal import Refusal
 from pentapod.timing import Trajectory, retime
@@ -126,7 +127,7 @@ def test_limits_hold_between_gridpoints_and_are_used(name):
     assert max(v, a, mean / piece.section_feeds[0]) < 1.0
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=examples(6, 12), deadline=None)
 @given(
     length=st.floats(-7, 0),
     shape=st.floats(-1.3, 1.5),
@@ -239,7 +240,7 @@ def test_retime_of_a_reversed_path_takes_as_long(name):
     assert again.duration == pytest.approx(there.duration, rel=2e-3)
 
 
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=examples(3, 6), deadline=None)
 @given(k=st.floats(0.05, 20.0))
 def test_retime_does_not_depend_on_units(k):
     """Lengths times k take as long when every limit is times k."""
@@ -255,7 +256,7 @@ def test_retime_does_not_depend_on_units(k):
     assert scaled.duration == pytest.approx(small.duration, rel=1e-3, abs=2 * FINE)
 
 
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=examples(3, 12), deadline=None)
 @given(k=st.floats(0.3, 3.0))
 def test_retime_scales_with_time(k):
     """Velocities times k and accelerations times k² take 1/k of the time."""

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from left_material import facet_distances
+from lengths import examples
 from pentapod import Mesh
 from pentapod.base.errors import MeshError
 from pentapod.mesh.offset.offset_surface import Window, offset_surface, onto_level
@@ -126,7 +127,7 @@ def test_open_sheet_has_an_offset_on_both_sides():
     assert enclosed_volume(vertices, triangles) == pytest.approx(volume, rel=4e-3)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=examples(6, 15), deadline=None)
 @given(seed=st.integers(0, 2**31), count=st.integers(1, 12))
 def test_offset_of_any_soup_is_closed_and_at_its_distance(seed, count):
     rng = np.random.default_rng(seed)

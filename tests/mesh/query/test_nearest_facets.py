@@ -8,6 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from lengths import examples
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.kernels.ball_kernels import facet_distance
 from pentapod.mesh.query.tree import FacetTree
@@ -79,7 +80,7 @@ def waves():
 
 def test_the_tree_finds_the_nearest_of_all_facets_up_to_any_distance():
     tree, rng = FacetTree.of(waves()), np.random.default_rng(4)
-    points = rng.uniform([-0.01, -0.01, -0.01], [0.07, 0.05, 0.01], (100, 3))
+    points = rng.uniform([-0.01, -0.01, -0.01], [0.07, 0.05, 0.01], (examples(100, 300), 3))
     g = np.zeros(3)
     every = np.array([[facet_distance(facet, *point, g) for facet in tree.corners] for point in points])
     least = every.min(axis=1)

@@ -6,6 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from timing_paths import Path, Piece, by_tip, line, machine, nodding, raster, straight
 
+from lengths import examples
 from pentapod.base.errors import InputError
 from pentapod.timing import Trajectory, certify, override, retime
 
@@ -112,7 +113,7 @@ def test_feed_hold_on_a_line_is_about_as_quick_as_the_legs_allow():
 KNOB = st.just(0.0) | st.floats(0.1, 1.5)
 
 
-@settings(max_examples=2, deadline=None)
+@settings(max_examples=examples(2, 6), deadline=None)
 @given(st.floats(0.0, 1.2), KNOB, KNOB, st.sampled_from(["linear", "cubic"]))
 @example(0.0, 0.0, 0.5, "linear")
 @example(0.0, 0.0, 0.5, "cubic")

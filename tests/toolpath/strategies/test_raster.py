@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 import toolpath_surfaces as surfaces
+from lengths import examples
 from pentapod.base.errors import ToolpathError
 from pentapod.geometry import RigidTransform, angle_between
 from pentapod.toolpath import (
@@ -267,7 +268,7 @@ def test_short_passes_are_dropped_and_reported():
     assert "short passes dropped" in str(report)
 
 
-@settings(max_examples=2, deadline=None)
+@settings(max_examples=examples(2, 4), deadline=None)
 @given(angle=st.floats(-3.0, 3.0), scale=st.floats(0.3, 3.0))
 def test_turning_and_scaling_the_part_turns_and_scales_the_path(angle, scale):
     vertices, faces = surfaces.grid(waves, cells=40)
@@ -283,7 +284,7 @@ def test_turning_and_scaling_the_part_turns_and_scales_the_path(angle, scale):
     check_laws(moved, toolpath, options)
 
 
-@settings(max_examples=2, deadline=None)
+@settings(max_examples=examples(2, 4), deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_turning_part_and_view_together_keeps_the_laws(seed):
     vertices, faces = surfaces.torus(sections=(60, 30))

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BPoly, CubicSpline
 
+from lengths import examples
 from pentapod.geometry.solids import Solid
 from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
 from pentapod.mesh.mesh import Mesh
@@ -245,7 +246,7 @@ def short(cubic):
     )
 
 
-@settings(max_examples=10)
+@settings(max_examples=examples(10, 25))
 @given(leg=st.integers(0, 4), share=st.floats(0.2, 1.1), away=st.floats(-0.06, 0.06), radius=st.floats(0.002, 0.02))
 def test_no_proof_of_clearance_where_samples_touch(short, leg, share, away, radius):
     shape = post(beside_leg(short, leg, share, away), radius=radius, height=0.04)
