@@ -79,3 +79,56 @@ def test_gaps_are_those_of_a_convex_program(name):
         assert weights.min() > -1e-6
         assert weights @ corners == pytest.approx(point, abs=1e-9)
     assert compared > 20
+
+
+def slivers(rng, solid):
+    """Facets with hardly any area: corners on a line but for rounding, or for a part in 10^3 to 10^8 of its length."""
+    size = 10.0 ** rng.uniform(-3.0, -1.5)
+    along, off = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
+    thin = size * 10.0 ** rng.uniform(-8.0, -3.0)
+    corners = np.array([np.zeros(3), size * along, rng.uniform(0.1, 0.9) * size * along + thin * off])
+    away = np.array([*(rng.normal(size=2) * 2.0 * solid.largest_radius), solid.low + 0.5 * rng.normal() * size])
+    return corners[rng.permutation(3)] + away
+
+
+def radial(rng, solid):
+    """Facets whose plane holds the axis but for rounding, beside the solid."""
+    turn = rng.uniform(0.0, 2.0 * np.pi)
+    out = solid.largest_radius + rng.uniform(1e-4, 5e-3) + np.append(0.0, rng.uniform(0.0, 5e-3, 2))
+    up = rng.uniform(solid.low - 2e-3, solid.high + 2e-3, 3)
+    return np.column_stack([out * np.cos(turn), out * np.sin(turn), up])
+
+
+@pytest.mark.parametrize("form", [slivers, radial])
+def test_gaps_of_facets_that_have_hardly_a_normal_or_lie_along_the_axis(form):
+    rng, compared = np.random.default_rng(11), 0
+    for k in range(120):
+        solid = list(SOLIDS.values())[k % len(SOLIDS)]
+        corners = form(rng, solid)
+        distance, _ = gap(solid, corners)
+        exact = 1e-3 * solved(solid, corners)
+        if exact > 1e-5:
+            compared += 1
+            # Far away the solver keeps its constraints to a part in 10^5 only.
+            assert distance == pytest.approx(exact, abs=2e-7, rel=1e-5)
+    assert compared > 40
+
+
+def test_depths_are_those_of_dense_samples():
+    """Where a facet cuts a cylinder: its depth is that of its deepest point, to 1 %."""
+    solid, rng = SOLIDS["cylinder"], np.random.default_rng(7)
+    shares = np.array([(a, b) for a in np.linspace(0.0, 1.0, 61) for b in np.linspace(0.0, 1.0 - a, 61)])
+    weights, inside = np.column_stack([1.0 - shares.sum(axis=1), shares]), 0
+    for _ in range(80):
+        corners = random_facet(rng, solid)
+        points = weights @ corners
+        depth = np.minimum(
+            solid.low_radius - np.hypot(points[:, 0], points[:, 1]),
+            np.minimum(points[:, 2] - solid.low, solid.high - points[:, 2]),
+        ).max()
+        if depth <= 1e-6:
+            continue
+        inside += 1
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max()
+        assert 0.989 * depth - 2e-7 <= -gap(solid, corners)[0] <= depth + longest / 60
+    assert inside > 10

@@ -29,7 +29,7 @@ NEARER = (0.5, 0.3)
 """Distances between passes, as shares of what is asked for, that are tried where passes come nearer together."""
 
 LITTLE = 10.0
-"""A ball's passes come nearer if no more is left than this multiple of what may be left; more lies elsewhere."""
+"""A ball's passes come nearer only if no more than this multiple of what may be left is left: more has other causes."""
 
 ROUNDING = 1.0 - 1e-9
 """Shares that differ by less count as equal."""

@@ -50,7 +50,7 @@ def planned(
     """Plan a job whose mesh was read, write the files into `staging`, and return the attempt and its outcome.
 
     machine, mesh: those of the job. own_machine: whether the machine is a value of the caller, of no file. Else as in
-    `pipeline.run`. Raises InputError.
+    `run.run`. Raises InputError.
     """
     specification = job_specification(
         job, machine, mesh, lambda: made_toolpath(job, machine, mesh, runner, piece, before), own_machine=own_machine
@@ -73,7 +73,7 @@ def planned(
 def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried], options: AdviceOptions) -> Outcome:
     """Search for changes with which a refused job is planned, and return the outcome whose refusal holds them.
 
-    again: plans a job and returns how that ends, as `pipeline.tried`.
+    again: plans a job and returns how that ends, as `run.tried`.
     """
     refusal, task, runner = outcome.refusal, attempt.task, attempt.runner
     if refusal is None or refusal.stage in FILES:  # a way is refused by the machine's file, not by the job

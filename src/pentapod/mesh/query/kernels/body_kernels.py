@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from pentapod.base.arrays import Floats
 from pentapod.numerics.kernels import kernel
 
@@ -171,23 +173,14 @@ def deviation_bound(motion: Floats, g: Floats, tau: float, size: float) -> float
 
 @kernel
 def normals_of_all(solids: Floats, tips: Floats, axes: Floats, points: Floats, normals: Floats) -> None:
-    """Fill normals (M, 3): from each of M bodies at rest, made of solids (S, 5), to a mesh point, where that is known.
+    """Fill normals (M, 3): from each of M bodies at rest, made of solids (S, 5), to a mesh point.
 
-    tips, axes, points (M, 3). Points of NaN are left out.
+    tips, axes, points (M, 3).
     """
+    still, pose, g = np.zeros(18), np.empty(6), np.empty(6)
     for m in range(len(points)):
-        if math.isnan(points[m, 0]):
-            continue
-        x, y, z = points[m, 0] - tips[m, 0], points[m, 1] - tips[m, 1], points[m, 2] - tips[m, 2]
-        height = x * axes[m, 0] + y * axes[m, 1] + z * axes[m, 2]
-        x, y, z = x - height * axes[m, 0], y - height * axes[m, 1], z - height * axes[m, 2]
-        aside = math.sqrt(x * x + y * y + z * z)
-        best, by_r, by_z = meridian_distance(solids[0], aside, height)
-        for k in range(1, len(solids)):
-            f, other_r, other_z = meridian_distance(solids[k], aside, height)
-            if f < best:
-                best, by_r, by_z = f, other_r, other_z
-        scale = by_r / aside if aside > 0.0 else 0.0
-        normals[m, 0] = scale * x + by_z * axes[m, 0]
-        normals[m, 1] = scale * y + by_z * axes[m, 1]
-        normals[m, 2] = scale * z + by_z * axes[m, 2]
+        pose[:3], pose[3:], best = tips[m], axes[m], math.inf
+        for k in range(len(solids)):
+            derivatives(solids[k], still, pose, points[m, 0], points[m, 1], points[m, 2], g)
+            if g[VALUE] < best:
+                best, normals[m] = g[VALUE], g[:3]

@@ -69,22 +69,30 @@ def _nearest_to_axis(own: Floats, lowest: Floats) -> float:
 
 
 @kernel
+def _lower(solid: Floats, own: Floats, a: float, b: float, c: float, lowest: Floats) -> None:
+    """Lower what was found in lowest (4,) to f at the weights a, b, c of a facet's corners, and to these weights."""
+    x = a * own[0, 0] + b * own[1, 0] + c * own[2, 0]
+    y = a * own[0, 1] + b * own[1, 1] + c * own[2, 1]
+    z = a * own[0, 2] + b * own[1, 2] + c * own[2, 2]
+    f = meridian_distance(solid, math.sqrt(x * x + y * y), z)[0]
+    if f < lowest[0]:
+        lowest[0], lowest[1], lowest[2], lowest[3] = f, a, b, c
+
+
+@kernel
 def told_at_once(solid: Floats, own: Floats, lowest: Floats) -> float:
     """Return a lower bound of f on a facet (3, 3) in the solid's frame: by its nearest point to the axis, and heights.
 
     lowest (4,): filled with the lower f of that point and of the highest and lowest corners, and weights of corners.
     """
     off = _nearest_to_axis(own, lowest)
-    height = lowest[1] * own[0, 2] + lowest[2] * own[1, 2] + lowest[3] * own[2, 2]
-    lowest[0] = meridian_distance(solid, off, height)[0]
+    lowest[0] = math.inf
+    _lower(solid, own, lowest[1], lowest[2], lowest[3], lowest)
     top = max(own[0, 2], own[1, 2], own[2, 2])
     bottom = min(own[0, 2], own[1, 2], own[2, 2])
     for k in range(3):
         if own[k, 2] == top or own[k, 2] == bottom:
-            value = meridian_distance(solid, math.sqrt(own[k, 0] ** 2 + own[k, 1] ** 2), own[k, 2])[0]
-            if value < lowest[0]:
-                lowest[0], lowest[1], lowest[2], lowest[3] = value, 0.0, 0.0, 0.0
-                lowest[1 + k] = 1.0
+            _lower(solid, own, 1.0 * (k == 0), 1.0 * (k == 1), 1.0 * (k == 2), lowest)
     return max(off - max(solid[2], solid[3]), solid[0] - top, bottom - solid[1]) - solid[4]
 
 
@@ -117,14 +125,12 @@ def _nearest_on_plane(solid: Floats, own: Floats, lowest: Floats) -> tuple[float
     size = math.sqrt(cx * cx + cy * cy + cz * cz)
     if size == 0.0:
         return -math.inf, 7
-    off = (cx * own[0, 0] + cy * own[0, 1] + cz * own[0, 2]) / size
-    if off < cz / size * 0.5 * (solid[0] + solid[1]):  # the normal leads away from the solid
-        cx, cy, cz, off = -cx, -cy, -cz, -off
-        ux, uy, uz, vx, vy, vz = vx, vy, vz, ux, uy, uz
-        first, second = 2, 1
-    else:
-        first, second = 1, 2
     nx, ny, nz = cx / size, cy / size, cz / size
+    if nx * own[0, 0] + ny * own[0, 1] + nz * (own[0, 2] - 0.5 * (solid[0] + solid[1])) < 0.0:
+        nx, ny, nz = -nx, -ny, -nz  # it leads from the solid to the facet
+    off = math.inf
+    for k in range(3):  # the normal of a thin facet is known less exactly
+        off = min(off, nx * own[k, 0] + ny * own[k, 1] + nz * own[k, 2])
     out = math.sqrt(nx * nx + ny * ny)
     low, high = solid[2] * out + solid[0] * nz, solid[3] * out + solid[1] * nz
     bound = off - max(low, high) - solid[4]
@@ -138,9 +144,9 @@ def _nearest_on_plane(solid: Floats, own: Floats, lowest: Floats) -> tuple[float
     square = size * size
     a = (cx * (y * vz - z * vy) + cy * (z * vx - x * vz) + cz * (x * vy - y * vx)) / square
     b = (cx * (uy * z - uz * y) + cy * (uz * x - ux * z) + cz * (ux * y - uy * x)) / square
-    beyond = (1 if a + b > 1.0 else 0) | (1 << first if a < 0.0 else 0) | (1 << second if b < 0.0 else 0)
+    beyond = (1 if a + b > 1.0 else 0) | (2 if a < 0.0 else 0) | (4 if b < 0.0 else 0)
     if beyond == 0:
-        lowest[0], lowest[1], lowest[1 + first], lowest[1 + second] = bound, 1.0 - a - b, a, b
+        _lower(solid, own, 1.0 - a - b, a, b, lowest)
     return bound, beyond
 
 

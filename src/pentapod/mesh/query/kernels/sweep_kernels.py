@@ -30,7 +30,6 @@ from pentapod.mesh.query.kernels.body_kernels import (
 )
 from pentapod.mesh.query.kernels.box_kernels import box_radius
 from pentapod.mesh.query.kernels.facet_kernels import (
-    RELATIVE_ERROR,
     STACK,
     WORK,
     counts_below,
@@ -75,6 +74,16 @@ def _about_box(
 
 
 @kernel
+def _children(node: int, boxes: Floats, g: Floats) -> tuple[int, int]:
+    """Return both children of a node; last, to be searched first, that with the deeper centre: it prunes the other."""
+    left, right = 2 * node + 1, 2 * node + 2
+    ahead = 0.0
+    for k in range(3):
+        ahead += g[k] * (boxes[left, k] - boxes[right, k])
+    return (right, left) if ahead < 0.0 else (left, right)
+
+
+@kernel
 def deepest(
     solid: Floats,
     motion: Floats,
@@ -105,7 +114,7 @@ def deepest(
         box = boxes[node]
         deviation = _about_box(solid, motion, pose, box, s, tau, g, more)
         fall = _fall(box, g)
-        least = best[0] - eps + RELATIVE_ERROR * min(best[0], 0.0)
+        least = counts_below(best, eps)
         if (
             g[VALUE] - fall - deviation >= least
             or count + 2 > STACK
@@ -114,13 +123,7 @@ def deepest(
             continue
         leaf = node - (leaves - 1)
         if leaf < 0 and deviation <= fall:
-            # Search the child with the deeper centre first: its result prunes the other.
-            left, right = 2 * node + 1, 2 * node + 2
-            ahead = 0.0
-            for k in range(3):
-                ahead += g[k] * (boxes[left, k] - boxes[right, k])
-            if ahead < 0.0:
-                left, right = right, left
+            left, right = _children(node, boxes, g)
             nodes[count, 0], nodes[count, 1], nodes[count, 2] = left, s, tau
             nodes[count + 1, 0], nodes[count + 1, 1], nodes[count + 1, 2] = right, s, tau
             count += 2
@@ -170,12 +173,7 @@ def _deepest_at_rest(
             continue
         leaf = node - (leaves - 1)
         if leaf < 0:
-            # Search the child with the deeper centre first: its result prunes the other.
-            left, right = 2 * node + 1, 2 * node + 2
-            ahead = 0.0
-            for k in range(3):
-                ahead += g[k] * (boxes[left, k] - boxes[right, k])
-            nodes[count, 0], nodes[count + 1, 0] = (right, left) if ahead < 0.0 else (left, right)
+            nodes[count, 0], nodes[count + 1, 0] = _children(node, boxes, g)
             count += 2
             continue
         for k in range(starts[leaf], starts[leaf + 1]):
