@@ -23,9 +23,9 @@ from pentapod.job.build.other_ways import (
     STANDS,
     STANDS_ON_END,
     ends,
+    may_come_nearer,
     may_stand,
     nearer,
-    nearer_helps,
     nearer_share,
     nearer_words,
     standing,
@@ -144,7 +144,7 @@ def other_way(
     share = nearer_share(job)
     if share is None or outcome.refusal.stage != STAGE or set(failed) != {SURFACE_LEFT}:
         return None
-    if not nearer_helps(job, failed[SURFACE_LEFT]):
+    if not may_come_nearer(job, failed[SURFACE_LEFT]):
         return None  # a ball leaves that much where no pass is
     last = {} if before is None or stepover_share(job) == 1.0 else failures(before.verdict)
     if SURFACE_LEFT in last and not _value(failed) < options.helps * _value(last):

@@ -24,7 +24,7 @@ from pentapod.job.advice.parts import Regions
 from pentapod.job.advice.settings import Tell, merged
 from pentapod.job.advice.trials import Trial
 from pentapod.job.build.left import foreseen, spread, uncovered
-from pentapod.job.build.other_ways import NEARER, nearer_helps
+from pentapod.job.build.other_ways import NEARER, may_come_nearer
 from pentapod.job.build.specification import job_collision_world, job_coverage, job_cutting
 from pentapod.job.build.tool import job_tool
 from pentapod.job.build.toolpath import drops_gouges, job_toolpath
@@ -154,7 +154,7 @@ class FailedClaims:
             return merged({"toolpath": {key: _shorter(by * getattr(table, key))}}, bound)
 
         # A run goes back for passes that are nearer together by itself, and it was not enough.
-        tried = min(NEARER) if nearer_helps(self.job, self.failed[_LEFT]) else 1.0
+        tried = min(NEARER) if may_come_nearer(self.job, self.failed[_LEFT]) else 1.0
         for share in (each for each in self.options.nearer if each < tried):
             yield "passes nearer together", nearer(share)
         if isinstance(self._tool, BallEnded):

@@ -89,7 +89,7 @@ def nearer_share(job: Job) -> float | None:
     return next((share for share in NEARER if share < ROUNDING * stepover_share(job)), None)
 
 
-def nearer_helps(job: Job, left: Certificate) -> bool:
+def may_come_nearer(job: Job, left: Certificate) -> bool:
     """Return whether passes nearer together may do a job whose only failing claim is about what is left."""
     return nearer_share(job) is not None and (ends(job) or (left.value or 0.0) <= LITTLE * (left.bound or 0.0))
 

@@ -73,7 +73,7 @@ class Attempt:
         """What runs the stages of the attempt."""
         return self.task.runner
 
-    def of(self, **changes: Any) -> Self:
+    def with_task(self, **changes: Any) -> Self:
         """Return the attempt at a task with some fields changed."""
         return dataclasses.replace(self, task=dataclasses.replace(self.task, **changes))
 

@@ -25,7 +25,7 @@ ANOTHER_WAY = "another way"
 """Name of the stage that says in which other way a job is done."""
 
 
-def first_attempts(attempt: Attempt) -> Outcome:
+def first_that_passes(attempt: Attempt) -> Outcome:
     """Return the outcome of a job that may be done in other ways: the first that passes, else why it failed as asked.
 
     The stages of that run are those of the attempt's runner afterwards. A bull or flat end whose axes along the normals
@@ -83,7 +83,7 @@ def _changed(attempt: Attempt, last: Outcome, before: Mend, mend: Mend) -> Attem
             if stage.name != "placement"
         ]
     runner.stages = [*kept, Stage("mended", 0.0, mend, str(mend))]
-    return attempt.of(
+    return attempt.with_task(
         specification=dataclasses.replace(task.specification, toolpath=path),
         runner=runner,
         left_out=mend.left_out,
@@ -109,7 +109,7 @@ def _otherwise(attempt: Attempt, failed: Outcome, job: Job, words: str) -> Outco
         specification = job_specification(job, task.machine, attempt.mesh, make, own_machine=own_machine)
     except InputError:  # no cut is left, or its surface is too large: the first refusal says more
         return failed
-    again = attempt.of(job=job, specification=specification, runner=runner)
+    again = attempt.with_task(job=job, specification=specification, runner=runner)
     outcome = again.planned()
     if not outcome.passed:
         outcome = mended(again, outcome)

@@ -18,7 +18,7 @@ from pentapod.job.build.toolpath import job_link_style
 from pentapod.job.mending import FailedWay
 from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage
 from pentapod.job.pipeline.attempt import Attempt, Writer, made_toolpath
-from pentapod.job.pipeline.other_attempts import first_attempts
+from pentapod.job.pipeline.other_attempts import first_that_passes
 from pentapod.job.plan_before import PlanBefore
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import StageRunner
@@ -62,7 +62,7 @@ def planned(
     attempt = Attempt(task, mesh, staging, writers)
     alone = piece is None and before is None and job.placement.setups == 1
     if alone and covers_region(job):
-        return attempt, first_attempts(attempt)
+        return attempt, first_that_passes(attempt)
     outcome = attempt.foreseen(upright=False) or attempt.planned()
     refusal = outcome.refusal
     if refusal is not None and refusal.stage == "placement" and piece is None and job.placement.setups > 1:
@@ -110,7 +110,7 @@ def _split(attempt: Attempt, refusal: Refusal) -> Outcome:
         folder = staging / SetUp.folder_of(number)
         folder.mkdir()
         specification = dataclasses.replace(task.specification, toolpath=part, missed=missed)
-        own_attempt = attempt.of(specification=specification, runner=own, piece=piece)
+        own_attempt = attempt.with_task(specification=specification, runner=own, piece=piece)
         parts.append(SetUp(number, piece, dataclasses.replace(own_attempt, staging=folder).planned()))
     done = SetUps(tuple(parts), cutting, missed, job.placement.setups)
     runner.stages.append(Stage("set-ups planned", sum(part.seconds for part in parts), done, str(done)))
