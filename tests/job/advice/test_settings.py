@@ -8,8 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pentapod.geometry.directions import normalised
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import Job
+from pentapod.job.advice.axes import axis_choices
 from pentapod.job.advice.options import OPTIONS
 from pentapod.job.advice.parts import Regions
 from pentapod.job.advice.settings import Setting, Settings
@@ -18,6 +20,7 @@ from pentapod.job.build.tool import job_tool
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.mesh.query.distance import MeshDistance
+from pentapod.planning.problem.constraints import FREE
 from refused_jobs import REFUSED
 
 JAMMED = replace(REFUSED["thick legs"], edits=(("leg_diameter_mm = 16", "leg_diameter_mm = 60"),))
@@ -71,6 +74,15 @@ def test_a_smaller_region_is_judged_at_places_that_the_tool_reaches(tmp_path):
         assert ((places > low - 2e-6) & (places < high + 2e-6)).all()
         centres = places + tool.tilt_centre * box.sketch.normals[: len(places)]
         assert (MeshDistance.of(mesh).points(centres).distance.min() > 0.99 * tool.tilt_centre) == clear
+
+
+@pytest.mark.parametrize(("name", "offered"), [("dome of 85 deg", True), ("dome of 60 deg, beam", False)])
+def test_one_direction_suits_a_ball_under_an_overhang_but_no_beam_at_a_wall(name, offered, tmp_path):
+    job, _, _, tool = loaded(tmp_path, name)
+    normals = normalised(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [1.0, 0.0, -0.1]]))
+    found = axis_choices(job, tool, Sketch(tool, np.eye(3), normals, normals), FREE, OPTIONS)
+    directions = [choice.changes["axis"].get("direction") for choice in found if "axis" in choice.changes]
+    assert ([0.0, 0.0, 1.0] in directions) == offered
 
 
 def test_a_table_beside_the_base_is_no_advice(tmp_path):
