@@ -92,3 +92,19 @@ def test_the_tree_finds_the_nearest_of_all_facets_up_to_any_distance():
         np.testing.assert_allclose(np.linalg.norm(away, axis=1), np.where(near, least, 0.0), atol=1e-15)
         np.testing.assert_allclose(every[near, facets[near]], least[near], atol=1e-15)
         np.testing.assert_array_equal(tree.within(points, within), near)
+
+
+@pytest.mark.parametrize("length", [1e-4, 2e-3, 3e-2])
+def test_a_chord_is_clear_where_no_sample_of_it_is_nearer(length):
+    """The distance changes by no more than half the way between two samples."""
+    tree, rng, steps = FacetTree.of(waves()), np.random.default_rng(5), 200
+    starts = rng.uniform([-0.005, -0.005, -0.008], [0.065, 0.045, 0.008], (examples(300, 2000), 3))
+    ways = rng.normal(size=starts.shape)
+    ends = starts + length * ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    shares = np.linspace(0.0, 1.0, steps + 1)[:, None, None]
+    nearest = tree.closest((starts + shares * (ends - starts)).reshape(-1, 3))[0].reshape(steps + 1, -1).min(axis=0)
+    for least in (5e-4, 2e-3, 5e-3):
+        clear = tree.clear(starts, ends, least)
+        assert not clear[nearest < least].any()
+        assert clear[nearest - 0.5 * length / steps > least].all()
+        assert 0 < clear.sum() < len(clear)

@@ -93,11 +93,14 @@ def missed_cells(tree: FacetTree, nodes: Nodes, surface: Floats, level: float) -
     points = points[~tree.within(points, level - 0.5 * math.sqrt(3.0) * grid.step)]
     gap, away, _ = tree.closest(points)
     points = points + (level * (1.0 + _BEYOND) / np.where(gap > 0.0, gap, 1.0) - 1.0)[:, None] * away
-    points = points[~tree.within(points, level * (1.0 + 0.9 * _BEYOND))]
     cells = np.floor((points - grid.low) / grid.step).astype(np.intp)
-    known = indices(nodes.keys, grid.keys(cells[:, None] + _CORNERS))
-    hidden = ((known >= 0) & ~nodes.outside[known]).all(axis=1)
-    points, cells = points[hidden], cells[hidden]
+    # Most cells are told by one or two of their corners, and few are left to be measured.
+    for corner in grid.keys(_CORNERS):
+        known = indices(nodes.keys, grid.keys(cells) + corner)
+        hidden = (known >= 0) & ~nodes.outside[known]
+        points, cells = points[hidden], cells[hidden]
+    beyond = ~tree.within(points, level * (1.0 + 0.9 * _BEYOND))
+    points, cells = points[beyond], cells[beyond]
     if not len(points) or not len(surface):
         return none
     own = KDTree(points)

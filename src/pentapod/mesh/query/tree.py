@@ -17,8 +17,8 @@ from pentapod.base.arrays import Bools, Floats, Ints, read_only
 from pentapod.mesh.mesh import Mesh
 from pentapod.numerics.threads import for_rows
 
-FACETS_PER_LEAF = 4
-"""Facets below each leaf, about: few make the tree deep, many make leaves slow."""
+FACETS_PER_LEAF = 2
+"""Facets below each leaf, at least, and fewer than twice as many: few make the tree large, many make leaves slow."""
 
 MORTON_BITS = 20
 """Bits of each coordinate along the Morton curve; three times as many must fit into 64."""
@@ -87,13 +87,11 @@ class FacetTree:
 
     def clear(self, starts: Floats, ends: Floats, least: float) -> Bools:
         """Return which chords (M,) are nowhere nearer to the mesh than `least` metres."""
-        from pentapod.mesh.query.kernels.segment_kernels import nearest_all  # noqa: PLC0415 - loads numba
+        from pentapod.mesh.query.kernels.segment_kernels import all_clear  # noqa: PLC0415 - loads numba
 
-        count = len(starts)
-        distances, where, facets = np.empty(count), np.empty((count, 4)), np.empty(count, dtype=np.intp)
-        given = (self.corners, self.boxes, self.starts, least, False)
-        for_rows(nearest_all, (starts, ends - starts), given, (distances, where, facets))
-        return facets < 0
+        clear = np.empty(len(starts), dtype=np.bool_)
+        for_rows(all_clear, (starts, ends - starts), (self.corners, self.boxes, self.starts, least), (clear,))
+        return clear
 
 
 def along_morton_curve(points: Floats, bounds: Floats) -> Ints:

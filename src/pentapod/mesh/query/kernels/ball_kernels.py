@@ -105,12 +105,15 @@ def lower_bound(box: Floats, start: Floats, travel: Floats, enough: float, g: Fl
 
 
 @kernel
-def nearest_time(p: Floats, start: Floats, travel: Floats, g: Floats) -> tuple[float, float]:
-    """Return the minimum distance of a moving point from a facet, and when; g (3,) is left as it is then."""
+def nearest_time(p: Floats, start: Floats, travel: Floats, enough: float, g: Floats) -> tuple[float, float]:
+    """Return the minimum distance of a moving point from a facet, and when; g (3,) is left as it is then.
+
+    Any value that is not below `enough` where the minimum is not.
+    """
     t0, t1 = 0.0, 1.0
     d0 = facet_distance(p, start[0], start[1], start[2], g)
     s0 = slope(g, d0, travel)
-    if s0 >= 0.0:
+    if s0 >= 0.0 or d0 + s0 >= enough:
         return d0, 0.0
     d1 = facet_distance(p, start[0] + travel[0], start[1] + travel[1], start[2] + travel[2], g)
     s1 = slope(g, d1, travel)
@@ -119,7 +122,7 @@ def nearest_time(p: Floats, start: Floats, travel: Floats, g: Floats) -> tuple[f
     best, when = (d0, 0.0) if d0 < d1 else (d1, 1.0)
     for round_ in range(ROUNDS):
         meet = (d1 - s1 * t1 - d0 + s0 * t0) / (s0 - s1)
-        if d0 + s0 * (meet - t0) >= best - EXACT_M:
+        if d0 + s0 * (meet - t0) >= min(enough, best - EXACT_M):
             break
         # At a kink tangents converge slowly: every third time the middle is taken.
         t = 0.5 * (t0 + t1) if round_ % 3 == 2 or not t0 < meet < t1 else meet
@@ -133,5 +136,6 @@ def nearest_time(p: Floats, start: Floats, travel: Floats, g: Floats) -> tuple[f
             t1, d1, s1 = t, d, s
         else:
             break
-    facet_distance(p, start[0] + when * travel[0], start[1] + when * travel[1], start[2] + when * travel[2], g)
+    if best < enough:
+        facet_distance(p, start[0] + when * travel[0], start[1] + when * travel[1], start[2] + when * travel[2], g)
     return best, when
