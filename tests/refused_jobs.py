@@ -334,7 +334,7 @@ REFUSED: dict[str, Refused] = {
         cap(20.0, 70.0),
         {
             "axis": {"mode": "auto"},
-            "toolpath": {"stepover_mm": 2.5},
+            "toolpath": {"stepover_mm": 3.0},
             "tolerance": {"left_mm": 0.2, "left_share": 0.001},
         },
     ),

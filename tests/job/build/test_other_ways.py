@@ -41,6 +41,7 @@ from pentapod.toolpath.surfaces.tip_surface import TipSurface
 from pentapod.verify import Verdict
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
 from pentapod.verify.verdict.verdict import Certificate, Place
+from refused_jobs import REFUSED
 from short_motion import motion
 
 SLOPE = float(np.tan(np.radians(20.0)))
@@ -346,3 +347,15 @@ def test_a_flat_end_on_a_slope_comes_nearer_and_the_output_says_so(tmp_path):
     left = {c.claim: c for c in verdict.certificates}["surface left on the region"]
     assert left.passed
     assert verdict.passed
+
+
+@pytest.mark.slow
+def test_a_ball_that_leaves_a_little_too_much_comes_nearer(tmp_path):
+    """At the steep rim of a cap the last passes leave a little more than a thousandth of the region."""
+    asked = REFUSED["passes too far apart at the rim"]
+    closer = replace(asked, tables={**asked.tables, "toolpath": {"stepover_mm": 2.5}})
+    job = Job.load(closer.write(tmp_path))
+    done = run(job, tmp_path / "out", advice=None)
+    assert done.passed
+    assert any("0.5 times as far apart as asked" in stage.remark for stage in done.stages)
+    assert judge(job, tmp_path / "out").passed
