@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.base.arrays import Floats, as_floats
+from pentapod.base.arrays import Floats, as_floats, row_lengths
 from pentapod.base.errors import ArrayError
 
 NEARLY_OPPOSITE = 3.0
@@ -15,7 +15,7 @@ NEARLY_OPPOSITE = 3.0
 def normalised(vectors: ArrayLike, name: str = "direction") -> Floats:
     """Return vectors (..., 3) scaled to unit length. Raises ArrayError where one has no length."""
     v = as_floats(vectors, name, (3,))
-    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    length = row_lengths(v)[..., None]
     if (length < 1e-300).any():
         raise ArrayError(f"{name} has zero length", expected="a vector that points somewhere")
     return v / length
@@ -27,7 +27,7 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> Floats:
     Kahan's formula, 2 atan2(‖â − b̂‖, ‖â + b̂‖): the arc cosine loses half the digits near 0.
     """
     u, v = normalised(a), normalised(b)
-    return 2.0 * np.arctan2(np.linalg.norm(u - v, axis=-1), np.linalg.norm(u + v, axis=-1))
+    return 2.0 * np.arctan2(row_lengths(u - v), row_lengths(u + v))
 
 
 def partway(start: Floats, end: Floats, share: Floats) -> Floats:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints, row_lengths
 from pentapod.mesh.topology import Topology, components
 
 CHUNK = 500_000
@@ -25,7 +25,7 @@ def facet_cross(vertices: Floats, faces: Ints) -> Floats:
 
 def unit_or_zero(vectors: Floats) -> Floats:
     """Return vectors (..., 3) scaled to unit length; zero vectors stay zero."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    length = row_lengths(vectors)[..., None]
     return vectors / np.where(length > 0.0, length, 1.0)
 
 
@@ -36,7 +36,7 @@ def corner_angles(vertices: Floats, faces: Ints) -> Floats:
         part = faces[first : first + CHUNK]
         sides = unit_or_zero(vertices[np.roll(part, -1, axis=1)] - vertices[part])
         back = -np.roll(sides, 1, axis=1)
-        difference, total = (np.linalg.norm(v, axis=-1) for v in (sides - back, sides + back))
+        difference, total = (row_lengths(v) for v in (sides - back, sides + back))
         angles[first : first + CHUNK] = 2.0 * np.arctan2(difference, total)
     return angles
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import KDTree
 
-from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints, row_lengths
 from pentapod.base.errors import ToolpathError
 from pentapod.geometry.runs import members
 from pentapod.mesh.mesh import Mesh
@@ -85,7 +85,7 @@ class Patch:
         patch = self
         while len(patch.faces):
             sides = np.roll(patch.faces, -1, axis=1)
-            long = np.linalg.norm(patch.vertices[sides] - patch.vertices[patch.faces], axis=2) > longest
+            long = row_lengths(patch.vertices[sides] - patch.vertices[patch.faces]) > longest
             if not long.any():
                 break
             if len(patch.faces) + long.sum() > MOST_FACETS:
@@ -107,12 +107,12 @@ class Patch:
         if not len(border):
             return Patch(self.vertices[:0], self.faces[:0], self.normals[:0]), np.zeros(0, dtype=np.bool_)
         start, along = self.vertices[border[:, 0]], self.vertices[border[:, 1]] - self.vertices[border[:, 0]]
-        counts = np.ceil(np.linalg.norm(along, axis=1) / longest).astype(np.intp) + 1
+        counts = np.ceil(row_lengths(along) / longest).astype(np.intp) + 1
         edge, number = members(counts)
         tree = KDTree(start[edge] + (number / np.maximum(counts - 1, 1)[edge])[:, None] * along[edge])
         # Drop distant facets and halve long edges in turns, so that distant facets are never refined.
         sides = self.vertices[np.roll(self.faces, -1, axis=1)] - self.vertices[self.faces]
-        patch, size = self, max(float(np.linalg.norm(sides, axis=2).max()), longest)
+        patch, size = self, max(float(row_lengths(sides).max()), longest)
         while True:
             patch = patch.refined(size)
             centres = patch.vertices[patch.faces].mean(axis=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import KDTree
 
-from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints, row_lengths, row_maxima
 from pentapod.mesh.normals import CHUNK, facet_cross
 from pentapod.mesh.topology import Topology
 
@@ -82,8 +82,8 @@ def _lower_than(share: float, vertices: Floats, faces: Ints) -> Bools:
     for first in range(0, len(faces), CHUNK):
         part = faces[first : first + CHUNK]
         corners = vertices[part]
-        longest = np.square(corners - np.roll(corners, 1, axis=1)).sum(axis=2).max(axis=1)
-        low[first : first + CHUNK] = np.linalg.norm(facet_cross(vertices, part), axis=1) <= share * longest
+        longest = row_maxima(row_lengths(corners - np.roll(corners, 1, axis=1))) ** 2
+        low[first : first + CHUNK] = row_lengths(facet_cross(vertices, part)) <= share * longest
     return low
 
 

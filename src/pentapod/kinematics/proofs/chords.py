@@ -15,7 +15,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.base.arrays import Floats, as_batch, as_floats
+from pentapod.base.arrays import Floats, as_batch, as_floats, row_lengths
 from pentapod.base.errors import ArrayError
 from pentapod.kinematics.batches import as_motion
 from pentapod.kinematics.component import as_component
@@ -102,7 +102,7 @@ class _Prover:
             np.concatenate(halves), np.concatenate([first, middle]), np.concatenate([middle, last]), depth - 1
         )
         off = middle - 0.5 * (first + last)
-        aside = np.linalg.norm(off[:, None, :3] + self.offsets[:, None] * off[:, None, 3:], axis=2)
+        aside = row_lengths(off[:, None, :3] + self.offsets[:, None] * off[:, None, 3:])
 
         def largest(values: Floats) -> Floats:
             return np.maximum(values[:half], values[half:])

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pentapod.base.arrays import Floats, as_batch
+from pentapod.base.arrays import Floats, as_batch, row_lengths
 from pentapod.kinematics.jacobian import invert
 from pentapod.kinematics.tubes.leg_equations import BuiltLegs
 
@@ -51,7 +51,7 @@ def pose_enclosure(
         # Where the base is far off, d has lost digits: by so many metres each vector may be wrong (N, 5).
         far = np.linalg.norm(p, axis=1)[:, None] + np.linalg.norm(robot.base_joints, axis=1) + 2.0 * np.abs(z)
         wrong = 4.0 * _U * far * ROUND_UP
-        here = np.linalg.norm(d, axis=2)
+        here = row_lengths(d)
         last = np.concatenate([np.zeros_like(i), i], axis=-1)[:, None]
         by_pose, rings = np.concatenate([d, z[:, None] * d], axis=-1), _Rings.of(robot, p, i)
         if rings is not None:
@@ -75,7 +75,7 @@ def pose_enclosure(
 
             size (N, 3, 6): what the rows are sums of, all counted as positive, for the rounding of these sums.
             """
-            straight = np.linalg.norm(linear @ rows[:, :, :5].swapaxes(1, 2), axis=2).max(axis=1)
+            straight = row_lengths(linear @ rows[:, :, :5].swapaxes(1, 2)).max(axis=1)
             lost = (np.linalg.norm(size, axis=1) * (16.0 * _U * (largest + residual))).sum(axis=1)
             return (straight + (np.linalg.norm(rows, axis=1) * residual).sum(axis=1) + lost) * ROUND_UP
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Floats, Ints, row_maxima
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.geometry.solids import Solid
 from pentapod.machine.clearance.collision_world import (
@@ -181,7 +181,7 @@ def _near(scene: Scene, obstacle: Obstacle, tips: Floats, axes: Floats, frame: R
 def _box_gap(obstacle: Obstacle, starts: Floats, ends: Floats) -> Floats:
     """Return the gaps (M,), largest coordinate, between the boxes of segments (M, 3) and the obstacle's box."""
     low, high = obstacle.surface.bounds
-    return np.maximum(np.minimum(starts, ends) - high, low - np.maximum(starts, ends)).max(axis=1)
+    return row_maxima(np.maximum(np.minimum(starts, ends) - high, low - np.maximum(starts, ends)))
 
 
 def tool_gap(obstacle: Obstacle, solids: tuple[Solid, ...], tips: Floats, axes: Floats, cap: float) -> Floats:

@@ -108,7 +108,8 @@ class Margins:
             return np.concatenate([self.own(tips[k : k + block], axes[k : k + block]) for k in blocks])
         tip, axis = list(np.moveaxis(tips, -1, 0)), list(np.moveaxis(axes, -1, 0))
         pose = ToolPose(self.scene.machine, self.scene.branch, tip, axis, NUMPY)
-        return np.stack(np.broadcast_arrays(*(limit.margin(pose) for limit in self.own_limits)), axis=-1)
+        values = np.broadcast_arrays(*(limit.margin(pose) for limit in self.own_limits))
+        return np.moveaxis(np.stack(values), 0, -1)  # one limit after the other in memory: the smallest is soon found
 
     def contacts(self, tips: Floats, axes: Floats, placement: RigidTransform) -> Floats:
         """Return the contacts (n, contact_numbers) that `symbolic` needs, of poses (n, 3); none without obstacles."""

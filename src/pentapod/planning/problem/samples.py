@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints, frozen, set_frozen
+from pentapod.base.arrays import Floats, Ints, frozen, row_lengths, set_frozen
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.problem.common_axis import CommonAxis
@@ -109,11 +109,11 @@ class ToolpathSamples:
         stride = np.linspace(0, len(features) - 1, min(len(features), MOST_SAMPLED)).astype(np.intp)
         features = features[stride]
         count = min(count, len(features))
-        first = int(np.square(features - features.mean(axis=0)).sum(axis=1).argmax())
-        chosen, nearest = [first], np.square(features - features[first]).sum(axis=1)
+        first = int(row_lengths(features - features.mean(axis=0)).argmax())
+        chosen, nearest = [first], row_lengths(features - features[first])
         while len(chosen) < count:
             chosen.append(int(nearest.argmax()))
-            nearest = np.minimum(nearest, np.square(features - features[chosen[-1]]).sum(axis=1))
+            nearest = np.minimum(nearest, row_lengths(features - features[chosen[-1]]))
         return stride[np.array(chosen, dtype=np.intp)]
 
 

@@ -218,22 +218,11 @@ def straight_rows(times: Floats, points: Floats, must: Bools, most: float) -> In
     points (N, 3 · k): of each of k points three coordinates. must (N,): rows to keep in any case; the first and the
     last are kept as well.
     """
+    from pentapod.report.page.straight_rows_kernels import mark_corners  # noqa: PLC0415  numba is heavy
+
     keep = must.copy()
     keep[[0, -1]] = True
-    fixed = np.flatnonzero(keep)
-    open_runs = list(zip(fixed[:-1].tolist(), fixed[1:].tolist(), strict=True))
-    while open_runs:
-        first, last = open_runs.pop()
-        if last - first < 2:
-            continue
-        share = (times[first + 1 : last] - times[first]) / (times[last] - times[first])
-        off = points[first + 1 : last] - points[first] - share[:, None] * (points[last] - points[first])
-        squares = np.square(off).reshape(len(off), -1, 3).sum(axis=-1).max(axis=1)
-        worst = int(squares.argmax())
-        if squares[worst] > most**2:
-            middle = first + 1 + worst
-            keep[middle] = True
-            open_runs += [(first, middle), (middle, last)]
+    mark_corners(np.ascontiguousarray(times), np.ascontiguousarray(points), most, keep)
     return np.flatnonzero(keep)
 
 

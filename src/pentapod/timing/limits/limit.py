@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, Self
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, row_maxima
+from pentapod.base.arrays import Floats, row_maxima, row_minima
 from pentapod.base.values import Value
 from pentapod.timing.path.path import PathDerivatives
 from pentapod.timing.path.setpoints import InterpolatedSetpoints
@@ -194,7 +194,7 @@ class Limit(Protocol):
     def ceiling(self, path: PathDerivatives) -> Floats:
         """Return the largest x (n,) that this limit allows with the best u."""
         speeds, rows = self.speed_rows(path), self.acceleration_rows(path)
-        x = np.full(len(path.s), np.inf) if speeds is None else np.square(speeds).min(axis=1)
+        x = np.full(len(path.s), np.inf) if speeds is None else row_minima(np.square(speeds))
         return x if rows is None else np.minimum(x, acceleration_ceiling(rows.first, rows.second, rows.offset))
 
     def share(self, path: PathDerivatives, motion: Motion) -> Floats:

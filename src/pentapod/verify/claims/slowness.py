@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints, row_maxima
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import marked_runs
@@ -121,7 +121,7 @@ def _used(replay: Replay) -> Floats:
     """Return the largest share (N − 1,) of any limit of legs and tool that is used from row to row."""
     machine, period = replay.machine, replay.program.period
     legs, tool = machine.legs, machine.tool_limits
-    used = (np.abs(np.diff(replay.program.legs, axis=0)) / (period * legs.max_velocity)).max(axis=1)
+    used = row_maxima(np.abs(np.diff(replay.program.legs, axis=0)) / (period * legs.max_velocity))
     _raise(used, _differences(replay.program.legs, 2, period) / legs.max_acceleration)
     _raise(used, _differences(replay.program.legs, 3, period) / legs.max_jerk)
     if machine.drive_forces.limited:
@@ -148,7 +148,7 @@ def _raise(used: Floats, shares: Floats) -> None:
     """Raise `used` (N − 1,) to shares (N − order, K) of differences, each at the step in its middle."""
     first = (len(used) - len(shares)) // 2
     part = used[first : first + len(shares)]
-    np.maximum(part, shares.max(axis=1), out=part)
+    np.maximum(part, row_maxima(shares), out=part)
 
 
 def _reasons(replay: Replay, runs: Ints, least: float) -> tuple[Bools, Floats]:

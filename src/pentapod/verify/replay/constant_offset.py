@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.base.arrays import Floats
+from pentapod.base.arrays import Floats, row_lengths
 from pentapod.verify.replay.claim import MM, with_allowance
 from pentapod.verify.replay.path_matching import points_at
 from pentapod.verify.replay.replay import Replay
@@ -55,4 +55,4 @@ def _distances_without(replay: Replay, offset: Floats) -> Floats | None:
     found = replay.matched(tilt_centres)
     if found.distances.max() > allowed or found.waypoint_distances.max() > allowed:
         return None
-    return np.linalg.norm(replay.tilt_centres - points_at(points, found.places), axis=1)
+    return row_lengths(replay.tilt_centres - points_at(points, found.places))

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints, row_lengths
 from pentapod.geometry.directions import angle_between, arc_weights
 from pentapod.geometry.polyline import arc_length
 from pentapod.numerics.blocks import blocks
@@ -146,8 +146,8 @@ def _places(
 
 def turns_on_spot(path: PosedPolyline, tolerance: float, options: MatchOptions = OPTIONS) -> Bools:
     """Return the intervals (n − 1,) on which the axis turns while the tilt centre hardly moves."""
-    length = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
-    turn = np.linalg.norm(np.diff(path.axes, axis=0), axis=1)
+    length = row_lengths(np.diff(path.points, axis=0))
+    turn = row_lengths(np.diff(path.axes, axis=0))
     return (length <= tolerance) & (turn * tolerance >= options.axis_scale * length) & (turn > 1e-12)
 
 
@@ -160,7 +160,7 @@ def _measure(
     distances, angles = np.empty(len(places)), np.empty(len(places))
     for part in blocks(len(places), options.at_once):
         points, axes = pose_at(path, turns, places[part])
-        distances[part] = np.linalg.norm(motion.points[part] - points, axis=1)
+        distances[part] = row_lengths(motion.points[part] - points)
         angles[part] = angle_between(motion.axes[part], axes)
     chord = np.minimum(times.astype(np.intp), len(motion.points) - 2)
     at = (times - chord)[:, None]
@@ -173,7 +173,7 @@ def _measure(
         turned=np.interp(places, waypoints, turned),
         waypoint_turned=turned,
         distances=distances,
-        waypoint_distances=np.linalg.norm(points_at(motion.points, times) - path.points, axis=1),
+        waypoint_distances=row_lengths(points_at(motion.points, times) - path.points),
         angles=angles,
         waypoint_angles=angle_between(pointed, path.axes),
     )

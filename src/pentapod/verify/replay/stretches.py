@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints, row_lengths
 from pentapod.geometry.directions import angle_between, arc_weights
 from pentapod.geometry.runs import marked_runs
 from pentapod.numerics.blocks import blocks
@@ -79,14 +79,14 @@ def _bounds(replay: Replay, of: Stretches, lever: float, largest_turn: float) ->
     along = np.einsum("ij,ij->i", off, chord[owner]) + lever**2 * np.einsum("ij,ij->i", turned, turn[owner])
     share = np.divide(along, square[owner], out=np.zeros_like(along), where=square[owner] > 0.0)
     share = np.clip(share, 0.0, 1.0)[:, None]
-    aside = np.maximum.reduceat(np.linalg.norm(off - share * chord[owner], axis=1), begins)
+    aside = np.maximum.reduceat(row_lengths(off - share * chord[owner]), begins)
     deviation = np.maximum.reduceat(replay.interval_bounds.deviations[sample], begins)
     if lever == 0.0:
         return aside + deviation
     angle = angle_between(first, last)
     a, b = arc_weights(angle[owner, None], share)
     swung = replay.axes[sample] - (a * first[owner] + b * last[owner])
-    apart = np.maximum.reduceat(np.linalg.norm(swung, axis=1), begins) + 0.125 * angle**2
+    apart = np.maximum.reduceat(row_lengths(swung), begins) + 0.125 * angle**2
     tilt = np.arcsin(np.minimum(apart, 1.0)) + np.maximum.reduceat(
         replay.interval_bounds.axis_deviations[sample], begins
     )
