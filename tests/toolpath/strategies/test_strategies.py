@@ -252,7 +252,13 @@ def bumpy_laws(name, seed, exponent):
     if name == "polyline":
         options = replace(options, lines=[line @ turn.T for line in plain.lines])
     tool = FlatEnd(1e-3 * scale)
-    toolpath, _ = toolpath_with_report(mesh, tool, options)
+    try:
+        toolpath, _ = toolpath_with_report(mesh, tool, options)
+    except ToolpathError as error:
+        # Turned anywhere, a drawing may lie beside the grid.
+        if name == "drawing" and "the region holds nothing to machine" in str(error):
+            return
+        raise
     cuts = check_laws(mesh, tool, options, toolpath)
     if isinstance(options, CoverOptions):
         assert coverage(mesh, options, cuts, count=2000) >= 0.998  # of 2000 points; see the slow form for the rest
@@ -265,6 +271,7 @@ def bumpy_laws(name, seed, exponent):
 @settings(max_examples=9, deadline=None)
 @given(name=st.sampled_from(ON_PARTS), seed=st.integers(0, 10_000), exponent=st.floats(-3.0, 3.0))
 @example(name="edges", seed=4349, exponent=2.845)  # passes that meet, with axes that do not
+@example(name="drawing", seed=3653, exponent=0.0)
 def test_bumpy_grids(name, seed, exponent):
     bumpy_laws(name, seed, exponent)
 
