@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from pentapod.base.errors import ArrayError
 from pentapod.geometry import angle_between, arc_weights, normalised, partway, tangent_frame
+from pentapod.geometry.directions import fastest_turn, turned
 
 numbers = st.floats(-1.0, 1.0, allow_subnormal=False)
 
@@ -86,3 +87,16 @@ def test_tangent_frame_in_the_upper_half_is_transported_along_the_great_circle()
     t1, t2 = tangent_frame(d)
     np.testing.assert_allclose(t1, carried.apply([1.0, 0.0, 0.0]), atol=1e-14)
     np.testing.assert_allclose(t2, carried.apply([0.0, 1.0, 0.0]), atol=1e-14)
+
+
+@pytest.mark.parametrize("apart_deg", [0.0, 40.0, 171.0, 171.9, 172.0, 175.0, 179.9, 180.0])
+def test_no_turn_is_faster_than_its_bound(apart_deg: float) -> None:
+    """Nearly opposite directions are joined by a way that is longer than the arc between them."""
+    rng, by, share = np.random.default_rng(7), np.array([0.0, 0.0, 1.0]), np.linspace(0.0, 1.0, 2001)
+    for start in (by, -by, *normalised(rng.normal(size=(40, 3)))):
+        beside = normalised(np.cross(start, rng.normal(size=3)))
+        end = np.cos(np.radians(apart_deg)) * start + np.sin(np.radians(apart_deg)) * beside
+        way = turned(start, end, share, by)
+        fastest = 2000.0 * float(angle_between(way[1:], way[:-1]).max())
+        assert fastest <= fastest_turn(start, end) + 1e-6
+        assert fastest_turn(start, end) <= 1.15 * float(angle_between(start, end)) + 1e-12

@@ -66,6 +66,16 @@ def turned(start: Floats, end: Floats, share: Floats, by: Floats) -> Floats:
     return partway(*ends, np.where(early, 2.0 * share, 2.0 * share - 1.0))
 
 
+def fastest_turn(start: Floats, end: Floats) -> float:
+    """Return a bound, radians per unit of `share`, on how fast `turned` turns from unit start (3,) to unit end (3,).
+
+    Nearly opposite directions are an angle a apart. The way round turns a right angle in its first half, and up to
+    3/2 π − a in its second, at twice that rate.
+    """
+    angle = float(angle_between(start, end))
+    return angle if angle < NEARLY_OPPOSITE else 3.0 * np.pi - 2.0 * angle
+
+
 def arc_weights(angle: Floats, share: Floats) -> tuple[Floats, Floats]:
     """Return weights a, b of the spherical interpolation a·start + b·end at `share`, 0 to 1, of an arc of this angle.
 

@@ -149,12 +149,8 @@ class Patch:
         return Patch(vertices, np.concatenate(faces), np.concatenate(corner_normals))
 
     def steeper(self, upright: Floats, angle: float) -> Patch:
-        """Return the part whose normals are more than `angle` radians from `upright` (3,) and from its opposite.
-
-        Those of facets, and the smooth ones: where facets are large, a cutter rolls over them as they are.
-        """
-        steep = self.only(np.abs(self.facet_normals @ upright) < np.cos(angle))
-        return steep.where_normals(lambda n: np.cos(angle) * np.linalg.norm(n, axis=-1) - np.abs(n @ upright))
+        """Return the part whose normals are more than `angle` radians from `upright` (3,) and from its opposite."""
+        return self.where_normals(lambda n: np.cos(angle) * np.linalg.norm(n, axis=-1) - np.abs(n @ upright))
 
     def above(self, values: Floats, bound: float) -> tuple[Patch, Floats]:
         """Return the part where a quantity (V,) is at least `bound`, and the quantity at its vertices."""

@@ -96,7 +96,7 @@ def test_the_tree_finds_the_nearest_of_all_facets_up_to_any_distance():
 
 @pytest.mark.parametrize("length", [1e-4, 2e-3, 3e-2])
 def test_a_chord_is_clear_where_no_sample_of_it_is_nearer(length):
-    """The distance changes by no more than half the way between two samples."""
+    """Between two samples a chord is nearer than at both by at most half their distance."""
     tree, rng, steps = FacetTree.of(waves()), np.random.default_rng(5), 200
     starts = rng.uniform([-0.005, -0.005, -0.008], [0.065, 0.045, 0.008], (examples(300, 2000), 3))
     ways = rng.normal(size=starts.shape)

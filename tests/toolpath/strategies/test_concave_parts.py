@@ -20,7 +20,7 @@ MOST_BEYOND = {"raster": 1e-3, "offset": 5e-3, "spiral": 5e-3}
 def regions_visited(job, mesh, toolpath) -> int:
     """Number of separate regions of the drive surface on which there are cuts.
 
-    A drop cutter sees one region where walls join them: a wall that leans over by more than half a degree parts them.
+    A wall that leans over by more than half a degree separates them. The drop cutter does not see that.
     """
     patch = DriveSurface.of(mesh, R, np.array([0.0, 0.0, 1.0])).patch(job_region(job))
     region = components(len(patch.vertices), *patch.topology.edges.T)[1]
@@ -42,7 +42,9 @@ def measured(name, strategy, parts=None) -> tuple[Left, int]:
     }
     job = Job.from_dict(tables, "toolpaths")
     toolpath, _ = job_toolpath(job, mesh)
-    regions = max(reachable.regions(np.radians(90.0)), regions_visited(job, mesh, toolpath))
+    regions = reachable.regions(np.radians(90.0))
+    if parts is not None:  # of generated parts the drop cutter sees all regions
+        regions = max(regions, regions_visited(job, mesh, toolpath))
     return left(reachable.samples(4000), toolpath, STEPOVER), regions
 
 

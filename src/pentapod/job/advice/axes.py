@@ -79,7 +79,8 @@ def axis_choices(
         cone = {} if own == usual else taken_out(job, "axis", ("tilt_deg",))
         for direction in _directions(job, sketch, constraints):
             same = axis.mode == "fixed" and np.allclose(normalised(axis.direction), direction, atol=0.001)
-            # A beam that leans far from the normal burns another spot; a ball does not mind, under an overhang neither.
+            # A beam that leans far from the normal burns another spot. A ball may have any direction, also where the
+            # part has overhangs.
             suits = not 0.0 < lean < min(float(angle_between(sketch.normals, direction).max()), 0.5 * np.pi)
             if suits and not (same and not cone):
                 narrow = any(choice.changes.get("axis", {}).get("mode") == "fixed" for choice in found)

@@ -15,7 +15,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.base.units import from_si, to_si
-from pentapod.geometry.directions import angle_between, turned
+from pentapod.geometry.directions import fastest_turn, turned
 from pentapod.job.build.placed_check import meetings
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.planning import PlacedPath, Placement
@@ -143,10 +143,10 @@ def _placed(
     """Return a route as a placed path, and its margins (N, M)."""
     back, segments = program.placement.inverse(), list[Segment]()
     for (a, start), (b, end) in pairwise(corners):
-        length, angle = float(np.linalg.norm(b - a)), float(angle_between(start, end))
-        if length < 1e-9 and angle < 1e-9:
+        length, turn = float(np.linalg.norm(b - a)), fastest_turn(start, end)
+        if length < 1e-9 and turn < 1e-9:
             continue
-        count = max(int(np.ceil(length / options.step)), int(np.ceil(angle / options.turn)), 1)
+        count = max(int(np.ceil(length / options.step)), int(np.ceil(turn / options.turn)), 1)
         share = np.linspace(0.0, 1.0, count + 1)
         tips, axes = a + share[:, None] * (b - a), turned(start, end, share, UPWARDS)
         axes[0], axes[-1] = start, end

@@ -94,7 +94,7 @@ def missed_cells(tree: FacetTree, nodes: Nodes, surface: Floats, level: float) -
     gap, away, _ = tree.closest(points)
     points = points + (level * (1.0 + _BEYOND) / np.where(gap > 0.0, gap, 1.0) - 1.0)[:, None] * away
     cells = np.floor((points - grid.low) / grid.step).astype(np.intp)
-    # Most cells are told by one or two of their corners, and few are left to be measured.
+    # One or two corners rule out most cells, so that few distances are measured.
     for corner in grid.keys(_CORNERS):
         known = indices(nodes.keys, grid.keys(cells) + corner)
         hidden = (known >= 0) & ~nodes.outside[known]

@@ -18,7 +18,7 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.numerics.threads import for_rows
 
 FACETS_PER_LEAF = 2
-"""Facets below each leaf, at least, and fewer than twice as many: few make the tree large, many make leaves slow."""
+"""Smallest mean number of facets in a leaf; the mean is below twice that. Few make the tree large, many slow leaves."""
 
 MORTON_BITS = 20
 """Bits of each coordinate along the Morton curve; three times as many must fit into 64."""

@@ -12,7 +12,8 @@ from pentapod.numerics.kernels import kernel
 def mark_corners(times: Floats, points: Floats, most: float, keep: Bools) -> None:
     """Mark more rows in keep (N,), until all others lie within `most` of lines between marked ones.
 
-    points (N, 3 · k): of each of k points three coordinates. The first and the last row are marked.
+    times (N,): ascending. points (N, 3 · k): of each of k points three coordinates. keep must already mark the first
+    and the last row.
     """
     ends, first = np.empty(len(times), dtype=np.intp), 0
     for next_kept in range(1, len(times)):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats
-from pentapod.geometry.directions import angle_between
+from pentapod.geometry.directions import fastest_turn
 from pentapod.geometry.polyline import arc_length, spaced
 from pentapod.toolpath.linking.links import blended, connection, turning
 from pentapod.toolpath.linking.ways_out import WayOut, WaysOut
@@ -122,7 +122,7 @@ class _Search:
         if len(both) == 1:
             tips = spaced(both[0].corners if into is None else both[0].corners[::-1], style.rapid_spacing)
             return Segment(SegmentKind.RAPID, tips, np.tile(first, (len(tips), 1)), np.inf)
-        turn, level = float(angle_between(first, last)), self.ways.level(first, last)
+        turn, level = fastest_turn(first, last), self.ways.level(first, last)
         up, down = (_raised(way.corners, level, style.view) for way in both)
         over = [up[1], down[1]]
         if (short := self.ways.search.lever * turn - float(np.linalg.norm(over[1] - over[0]))) > 0.0:

@@ -14,7 +14,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
-from pentapod.geometry.directions import NEARLY_OPPOSITE, angle_between, eased, turned
+from pentapod.geometry.directions import NEARLY_OPPOSITE, angle_between, eased, fastest_turn, turned
 from pentapod.geometry.polyline import arc_length, spaced
 from pentapod.toolpath.options import Entry
 from pentapod.toolpath.toolpath import Segment, SegmentKind
@@ -91,11 +91,8 @@ def rapid(start: Pose | None, end: Pose | None, style: LinkStyle) -> Segment:
     if start is None or end is None:
         tips = spaced(path, style.rapid_spacing)
         return Segment(SegmentKind.RAPID, tips, np.tile(first, (len(tips), 1)), np.inf)
-    angle = float(angle_between(first, last))
-    # By way of the view one half may be up to π − angle longer than a right angle.
-    angle = angle if angle < NEARLY_OPPOSITE else 3.0 * np.pi - 2.0 * angle
     # Midway the axis turns 15/8 times as fast as on average.
-    turn = 1.875 * angle
+    turn = 1.875 * fastest_turn(first, last)
     length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
     tips = spaced(path, min(style.rapid_spacing, length * style.axis_step / max(turn, style.axis_step)))
     along = arc_length(tips)

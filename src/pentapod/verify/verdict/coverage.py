@@ -87,7 +87,10 @@ class Coverage(Value):
             return cls.nothing(f"{type(options).__name__.removesuffix('Options').lower()}: lines that cover no region")
         region = Patch.of(part, options.region)
         if isinstance(options, WaterlineOptions):
-            region = region.steeper(np.asarray(options.upright), options.shallowest)
+            upright, flattest = np.asarray(options.upright), options.shallowest
+            region = region.steeper(upright, flattest)
+            # A cutter rolls over a large flat facet as it is, however far smooth normals lean over it.
+            region = region.only(np.abs(region.facet_normals @ upright) < np.cos(flattest))
         if left is None:
             left = cls.allowed_left(options, tool, path_tolerance)
         return cls(region, left, share, options.up, whole)

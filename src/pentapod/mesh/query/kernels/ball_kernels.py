@@ -108,7 +108,8 @@ def lower_bound(box: Floats, start: Floats, travel: Floats, enough: float, g: Fl
 def nearest_time(p: Floats, start: Floats, travel: Floats, enough: float, g: Floats) -> tuple[float, float]:
     """Return the minimum distance of a moving point from a facet, and when; g (3,) is left as it is then.
 
-    Any value that is not below `enough` where the minimum is not.
+    Where the minimum is not below `enough`, the search ends early: it returns a distance that is not below `enough`,
+    and g is of no use.
     """
     t0, t1 = 0.0, 1.0
     d0 = facet_distance(p, start[0], start[1], start[2], g)

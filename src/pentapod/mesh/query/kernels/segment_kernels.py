@@ -146,11 +146,12 @@ def nearest_all(
 def all_clear(
     starts: Floats, travels: Floats, corners: Floats, boxes: Floats, leaf_starts: Ints, least: float, clear: Bools
 ) -> None:
-    """Fill which short motions (M,) near the mesh never come nearer to it than `least`.
+    """Fill clear (M,): whether points that move from starts to starts + travels stay `least` away from the mesh.
 
-    As `nearest_all`. A search ends with the first facet that is nearer.
+    starts, travels (M, 3): metres, best for short motions near the mesh. A search ends with the first facet that is
+    nearer.
     """
-    nodes, g, leaves = np.empty(STACK, dtype=np.intp), np.empty(3), len(leaf_starts) - 1
+    nodes, bounds, g, leaves = np.empty(STACK, dtype=np.intp), np.empty(STACK), np.empty(3), len(leaf_starts) - 1
     for m in range(len(starts)):
         start, travel = starts[m], travels[m]
         nodes[0], count, found = 0, 1, False
@@ -164,17 +165,9 @@ def all_clear(
                         found = True
                         break
                 continue
-            near, far = 2 * node + 1, 2 * node + 2
-            to_near = lower_bound(boxes[near], start, travel, least, g)
-            to_far = lower_bound(boxes[far], start, travel, least, g)
-            if to_near > to_far:
-                near, far, to_near, to_far = far, near, to_far, to_near
-            if to_far < least:
-                nodes[count] = far
-                count += 1
-            if to_near < least:
-                nodes[count] = near
-                count += 1
+            near = lower_bound(boxes[2 * node + 1], start, travel, least, g)
+            last = lower_bound(boxes[2 * node + 2], start, travel, least, g)
+            count = open_node(node, near, last, least, count, nodes, bounds)
         clear[m] = not found
 
 
