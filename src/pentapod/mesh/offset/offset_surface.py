@@ -34,6 +34,9 @@ _KEY_BITS = 53.0
 """Bits of the largest key of a node, with room for finer grids."""
 _SHIFT = np.array([0.3819660, 0.2679492, 0.4142136])
 """Shares of a step by which the grid is off the part, so that flat faces do not lie in its planes."""
+_UNTOLD, _INSIDE, _OUTSIDE = np.arange(3, dtype=np.int8)
+"""Sides of a node: not told by the middle of its block, or on that side of the level."""
+_SIDE_BITS = 2
 _ROUNDS, _ON_LEVEL = 3, 1e-11
 """How often a vertex is moved towards the level, while it is off by this share."""
 
@@ -175,30 +178,41 @@ def _nodes(tree: FacetTree, grid: Grid, blocks: _Blocks, level: float) -> tuple[
     And whether each of the blocks is outside and not near the level.
     """
 
-    def classed(cells: Ints, size: int) -> tuple[Bools, Bools]:
-        """Return which cells (M, 3) of `size` steps may hold some of the level, and which are outside of it."""
+    def classed(cells: Ints, size: int) -> tuple[Floats, Bools]:
+        """Return how far beyond the level the middles of cells (M, 3) of `size` steps are, and which may hold it."""
         half = 0.5 * math.sqrt(3.0) * size * grid.step
         gap = tree.closest(grid.low + (cells + 0.5) * (size * grid.step), level + 1.01 * half)[0]
-        near = np.abs(gap - level) <= 1.001 * half
-        return near, (gap > level) & ~near
+        return gap - level, np.abs(gap - level) <= 1.001 * half
 
     groups = (blocks.high - blocks.low) // _GROUP
     group = blocks.low // _GROUP + np.indices(tuple(groups)).reshape(3, -1).T
-    near, out = classed(group, _GROUP * _BLOCK)
-    wide = out.reshape(tuple(groups))
+    beyond, near = classed(group, _GROUP * _BLOCK)
+    wide = ((beyond > 0.0) & ~near).reshape(tuple(groups))
     for axis in range(3):
         wide = wide.repeat(_GROUP, axis=axis)
     block = (_GROUP * group[near][:, None] + np.indices((_GROUP,) * 3).reshape(3, -1).T).reshape(-1, 3)
-    near, out = classed(block, _BLOCK)
-    wide[tuple((block - blocks.low).T)] = out
-    block = block[near]
+    beyond, near = classed(block, _BLOCK)
+    wide[tuple((block - blocks.low).T)] = (beyond > 0.0) & ~near
+    block, beyond = block[near], beyond[near]
     if len(block) * _BLOCK**3 > MOST_NODES:
         raise _too_fine(tree, grid.step)
     within = np.indices((_BLOCK + 1,) * 3).reshape(3, -1).T
-    keys = (grid.keys(_BLOCK * block)[:, None] + grid.keys(within)).ravel()
+    keys = grid.keys(_BLOCK * block)[:, None] + grid.keys(within)
+    # A node that is nearer to the middle of its block than this is to the level lies on the same side of it.
+    reach = 1.001 * grid.step * np.linalg.norm(within - 0.5 * _BLOCK, axis=1)
+    told = np.where(beyond > 0.0, _OUTSIDE, _INSIDE)[:, None]
+    # The side stands below the key: the last of equal keys is one whose side is told, where there is one.
+    keys <<= _SIDE_BITS
+    keys |= np.where(np.abs(beyond)[:, None] > reach, told, _UNTOLD)
+    keys = keys.ravel()
     keys.sort()
-    keys = keys[np.concatenate([[True], keys[1:] != keys[:-1]])]
-    return keys, ~tree.within(grid.points(keys), level), wide
+    sides = keys & (1 << _SIDE_BITS) - 1
+    keys >>= _SIDE_BITS
+    last = np.concatenate([keys[1:] != keys[:-1], [True]])
+    keys, sides = keys[last], sides[last]
+    outside, untold = sides == _OUTSIDE, np.flatnonzero(sides == _UNTOLD)
+    outside[untold] = ~tree.within(grid.points(keys[untold]), level)
+    return keys, outside, wide
 
 
 def _reached(tree: FacetTree, nodes: Nodes, edges: Edges, blocks: _Blocks, wide: Bools, level: float) -> Bools:
