@@ -226,6 +226,21 @@ def test_the_tilt_centres_way_is_its_derivative(mixed):
     np.testing.assert_allclose(path.surface_rate(s)[inside], fd[inside], rtol=1e-5)
 
 
+def test_a_ball_that_rolls_over_an_edge_does_not_stop(desk):
+    """Its tip is kept on the edge and goes to and fro by micrometres, which is no corner of the motion."""
+    angles = np.concatenate([np.zeros(3), np.linspace(0.0, 0.5, 12), np.full(3, 0.5)])
+    _, axes = fan(np.zeros((len(angles), 3)), angles)
+    along = np.concatenate([np.linspace(-0.01, -0.002, 3), np.zeros(12), np.linspace(0.002, 0.01, 3)])
+    tips = along[:, None] * np.cross([0.0, 1.0, 0.0], axes)
+    tips[3:15, 0] += 2e-6 * (-1.0) ** np.arange(12)
+    toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),), 0.003)
+    path = leg_path(placed_on(desk, toolpath), desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    assert len(path.pieces) == 1
+    # Its length is known: 16 mm of the tip, beside which the turn counts little.
+    assert 0.02 < path.length < 0.021
+
+
 def test_a_sharp_reversal_stops(desk):
     tips, axes = fan([[0, 0, 0], [0.03, 0, 0], [0.0, 0.002, 0]], np.zeros(3))
     toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),))

@@ -17,7 +17,7 @@ from pentapod.base.values import Result, Value
 from pentapod.geometry.fillet import BULGE, blended, knots_between
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.machine import Machine
-from pentapod.planning.leg_path.tool_curve import ToolCurve, TooSharpError
+from pentapod.planning.leg_path.tool_curve import REORIENTATION_LEVER_M, ToolCurve, TooSharpError
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.toolpath.toolpath import Segment, SegmentKind
 
@@ -288,10 +288,12 @@ def _distance_to_origin(a: Floats, b: Floats) -> Floats:
 def _stops(points: Floats, tilt_centre: float, segment: Ints, segments: tuple[Segment, ...], angle: float) -> Bools:
     """Return for each inner waypoint (N − 2,) whether it is a stop: a change from or to rapids, or a sharp corner.
 
-    points (N, 6): tilt centres and axes. angle: least turn of a sharp corner, radians.
+    points (N, 6): tilt centres and axes. angle: least turn of a sharp corner, radians. A tip that a ball keeps on an
+    edge goes to and fro by micrometres: it has a corner only where its path has one together with that of the axis.
     """
     rapid = np.array([s.kind is SegmentKind.RAPID for s in segments])[segment]
-    tilt_centres, tips = points[:, :3], points[:, :3] - tilt_centre * points[:, 3:]
+    tilt_centres, axes = points[:, :3], points[:, 3:]
+    tips = np.hstack([tilt_centres - tilt_centre * axes, REORIENTATION_LEVER_M * axes])
     return (rapid[1:] != rapid[:-1]) | _turns(tilt_centres, angle) | _turns(tips, angle)
 
 
