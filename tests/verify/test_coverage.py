@@ -7,7 +7,8 @@ import pytest
 
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
-from pentapod.toolpath import BallCutter, WaterlineOptions
+from pentapod.mesh.region import Region
+from pentapod.toolpath import BallCutter, RasterOptions, WaterlineOptions
 from pentapod.verify import Coverage
 from refused_jobs import cap
 
@@ -25,3 +26,20 @@ def test_waterlines_need_not_machine_a_part_of_a_facet_that_is_too_flat():
     assert region.areas.sum() == pytest.approx(part.facet_areas[steep].sum(), rel=1e-12)
     # By smooth normals alone it would be more.
     assert Patch.whole(part).steeper(up, options.shallowest).areas.sum() > 1.02 * region.areas.sum()
+
+
+def test_a_program_need_not_machine_a_part_of_a_facet_that_is_too_steep():
+    """Six rings of facets, up to 46 deg: the ball rolls over the fifth one, of 37 deg, as it is, not up to 35 deg."""
+    vertices, faces = cap(30.0, 50.0, 6)()
+    part, up = Mesh.of(1e-3 * vertices, faces), np.array([0.0, 0.0, 1.0])
+    options = RasterOptions(stepover=2e-3, region=Region(angle=np.radians(35.0)))
+    region = Coverage.of(part, BallCutter(3e-3), options, path_tolerance=20e-6).region
+    slopes = np.degrees(np.arccos(part.facet_normals @ up))
+    own = slopes <= 35.0
+    assert 35.0 < slopes[~own].min() < 38.0
+    # All of the facets of the rings inside, but where smooth normals lean beyond the angle: at most half of the last.
+    assert np.degrees(np.arccos(region.facet_normals @ up)).max() <= 35.0
+    whole, last = part.facet_areas[own].sum(), part.facet_areas[own & (slopes > slopes[own].max() - 1.0)].sum()
+    assert whole - 0.5 * last < region.areas.sum() <= whole
+    # By smooth normals alone it would be more.
+    assert Patch.of(part, options.region).areas.sum() > 1.05 * region.areas.sum()

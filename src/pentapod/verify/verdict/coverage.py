@@ -25,6 +25,9 @@ from pentapod.toolpath.toolpath import Toolpath
 MOST_FACETS = 1_000_000
 """Facets into which the region of a piece is refined at most."""
 
+SAME_ANGLE = 1e-9
+"""Cosine by which a facet's normal may be beyond the angle of a region, and still counts as within it."""
+
 RIDGE_FACTOR = 1.25
 """Default of how much higher than on a plane ridges may be, because the surface is curved."""
 
@@ -85,11 +88,12 @@ class Coverage(Value):
         """
         if left is None and not isinstance(options, CoverOptions):
             return cls.nothing(f"{type(options).__name__.removesuffix('Options').lower()}: lines that cover no region")
+        # A cutter rolls over a large flat facet as it is, however far smooth normals lean over it.
         region = Patch.of(part, options.region)
+        region = region.only(options.region.faces(region.facet_normals) >= -SAME_ANGLE)
         if isinstance(options, WaterlineOptions):
             upright, flattest = np.asarray(options.upright), options.shallowest
             region = region.steeper(upright, flattest)
-            # A cutter rolls over a large flat facet as it is, however far smooth normals lean over it.
             region = region.only(np.abs(region.facet_normals @ upright) < np.cos(flattest))
         if left is None:
             left = cls.allowed_left(options, tool, path_tolerance)
