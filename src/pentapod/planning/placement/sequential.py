@@ -6,6 +6,7 @@ Optimization, ch. 14: minimax). Every step is judged by the margins themselves, 
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,6 +22,7 @@ from pentapod.planning.placement.rail_positions import STEP_M, at_rail_positions
 from pentapod.planning.problem.formulation import Room, StepSlopes, placement_room, step_slopes, stepped
 from pentapod.planning.problem.linear_model import REACH, LinearModel, valleys
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
+from pentapod.planning.problem.weights import NEEDED_MARGIN
 from pentapod.planning.tool_axis.smoothing import smoothed
 
 _NO_ROWS: Ints = np.zeros(0, dtype=np.intp)
@@ -32,7 +34,8 @@ class SequentialOptions:
 
     waypoints: used in every step, evenly spaced, beside those where the margins are smallest, up to `lowest` for each
     kind; all, where there are no more than twice as many. All are checked when the steps have ended. steps, rounds:
-    maximum of steps, and of checks at all waypoints. tolerance: decrease of the smallest margin at all waypoints that
+    maximum of steps, and of checks at all waypoints. recent, gain: steps also end where so many of them have raised a
+    margin that fits by less than this share. tolerance: decrease of the smallest margin at all waypoints that
     calls for another round. least: smaller predicted increases, and smaller trust regions, end the steps. rough: the
     predicted increase where candidates are compared, and `astray` the tolerance then. hope: predicted increases below
     the margin to beat at which steps end then. known_m, known_rad: from another candidate, as near steps end that do
@@ -44,6 +47,8 @@ class SequentialOptions:
     waypoints: int = 400
     lowest: int = 24
     steps: int = 60
+    recent: int = 10
+    gain: float = 3e-3
     rounds: int = 10
     tolerance: float = 1e-4
     least: float = 1e-5
@@ -119,9 +124,11 @@ class SequentialSolver:
         slopes = step_slopes(problem, start.margins, guides=self.guides)
         curvature, known = Curvature(problem, start.margins, self.guides), None
         model = self.model(best, rows, best.smallest, slopes=slopes, values=here)
+        reached = deque[float](maxlen=options.recent)
         for _ in range(options.steps):
-            if best.smallest >= enough:
+            if best.smallest >= enough or (len(reached) == options.recent and self._stalls(reached[0], best.smallest)):
                 break
+            reached.append(best.smallest)
             step = curvature.best_step(model, best, radius, known)
             known, predicted = step.multipliers, step.predicted
             if predicted < least or self._leads_to_no_more(best, predicted, others or ()):
@@ -144,6 +151,10 @@ class SequentialSolver:
                 leaning = np.union1d(leaning, valleys(-problem.steepness(best.coefficients + step.change)[:, None]))
             model = self.model(best, rows, best.smallest, (extra, leaning), slopes, here)
         return best
+
+    def _stalls(self, before: float, smallest: float) -> bool:
+        """Return whether a margin that fits has hardly grown since it was `before`."""
+        return smallest >= NEEDED_MARGIN and smallest - before < self.options.gain * smallest
 
     def _leads_to_no_more(self, at: Candidate, predicted: float, others: Sequence[Candidate]) -> bool:
         """Return whether steps from here are expected to end below another candidate, or at it."""
