@@ -150,6 +150,27 @@ def test_axes_that_leave_too_much_are_not_tried_at_other_places(known, tmp_path,
     assert len(axes) == len({str(axis) for axis in axes})
 
 
+@pytest.mark.parametrize(("failed", "there"), [("component kept", 1), ("tip deviation", 2)])
+def test_another_place_is_tried_next_where_a_program_is_near_a_singular_surface(failed, there, tmp_path, monkeypatch):
+    """Other tool axes hardly help there; for other claims a second one is tried at the same place."""
+
+    def plan(job: Job, _) -> Tried:
+        planned.append(job)
+        return Tried("verdict", failed=frozenset((failed,)))
+
+    def estimated(_, kinds, *__, **___):
+        return SimpleNamespace(
+            margin=0.2, shortfalls=(), samples=kinds[0], candidate=SimpleNamespace(transform=RigidTransform.identity())
+        )
+
+    monkeypatch.setattr(Settings, "_best", estimated)
+    monkeypatch.setattr(Settings, "beyond_a_single_place", lambda _: ())
+    planned: list[Job] = []
+    job = Job.load(REFUSED["table too low"].write(tmp_path))
+    advised(job, job_machine(job), job_mesh(job), None, plan, AdviceOptions(plans=4), silent)
+    assert [each.placement == job.placement for each in planned].index(False) == there
+
+
 @pytest.mark.parametrize(("stage", "split"), [("placement", True), ("verdict", False)])
 def test_a_program_that_fails_is_not_split_into_setups(stage, split, tmp_path, monkeypatch):
     """What has a place in one set-up is planned in one, and fails again; what fits by a hair is planned before less."""

@@ -18,6 +18,7 @@ from pentapod.job.advice.places import Place
 from pentapod.job.advice.settings import Setting, Settings, joined, merged
 from pentapod.job.build.values import job_machine
 from pentapod.planning.estimate import Estimate
+from pentapod.verify.claims.component import COMPONENT_KEPT
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
 
 LEFT_ALONE = frozenset((SURFACE_LEFT,))
@@ -98,6 +99,9 @@ class Trials:
         for place in self.settings.places:
             for setting in islice(self._in_place(place, own), self.options.failures):
                 yield from self._of_setting(setting)
+                last = self.ended()
+                if last is not None and last.failed and all(each.startswith(COMPONENT_KEPT) for each in last.failed):
+                    break  # it is near a singular surface there, whatever the tool axes
 
     def _in_place(self, place: Place, own: bool) -> Iterator[Setting]:
         """Yield other tool axes with one placement; those that fit comfortably as soon as they are found."""

@@ -59,7 +59,10 @@ def _finding(replay: Replay, measure: ProvenMeasure, column: int) -> Finding:
 NAMED = ("w", "S", "roll")
 """Measures with a claim of their own."""
 
+COMPONENT_KEPT = "component kept"
+"""How the names of these claims begin."""
+
 CLAIMS = tuple(
-    Claim(f"component kept{', ' if measure else ''}{measure}", partial(kept, measure=measure), needs_pose=False)
+    Claim(f"{COMPONENT_KEPT}{', ' if measure else ''}{measure}", partial(kept, measure=measure), needs_pose=False)
     for measure in (*NAMED, "")
 )
