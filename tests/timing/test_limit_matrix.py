@@ -1,5 +1,6 @@
 """Looser limits never make a motion slower: the matrix of paths and limits; memory follows durations."""
 
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -71,7 +72,8 @@ print(trajectory.duration, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - 
 def test_memory_is_linear_in_the_duration():
     def peak(length):
         command = [sys.executable, "-c", MEMORY, str(length), "20", "400"]
-        told = subprocess.run(command, capture_output=True, text=True, check=True, cwd=File(__file__).parent)
+        here = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        told = subprocess.run(command, capture_output=True, text=True, check=True, env=here)
         return map(float, told.stdout.split())
 
     (short, little), (long, much) = peak(0.25), peak(1.0)
