@@ -16,6 +16,7 @@ from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
+from pentapod.mesh.region import Region
 from pentapod.toolpath.lines.scallop import scallop_height
 from pentapod.toolpath.linking.partition import Piece, cutting_intervals
 from pentapod.toolpath.options import CoverOptions, PathOptions
@@ -88,12 +89,11 @@ class Coverage(Value):
         """
         if left is None and not isinstance(options, CoverOptions):
             return cls.nothing(f"{type(options).__name__.removesuffix('Options').lower()}: lines that cover no region")
-        # A cutter rolls over a large flat facet as it is, however far smooth normals lean over it.
-        region = Patch.of(part, options.region)
-        region = region.only(options.region.faces(region.facet_normals) >= -SAME_ANGLE)
+        region = _as_facets_lean(Patch.whole(part).in_box(options.region), options.region)
         if isinstance(options, WaterlineOptions):
             upright, flattest = np.asarray(options.upright), options.shallowest
             region = region.steeper(upright, flattest)
+            # Here, too, a facet counts as it is.
             region = region.only(np.abs(region.facet_normals @ upright) < np.cos(flattest))
         if left is None:
             left = cls.allowed_left(options, tool, path_tolerance)
@@ -131,6 +131,17 @@ class Coverage(Value):
         nearest = KDTree(start[owner] + share * (end - start)[owner]).query(middles)[1]
         own = mine[cutting[owner[np.asarray(nearest)]]]
         return replace(self, region=Patch(fine.vertices, fine.faces[own], fine.normals[own]))
+
+
+def _as_facets_lean(patch: Patch, region: Region) -> Patch:
+    """Return the part of a patch within the angle of a region, by smooth normals, without facets that are steeper.
+
+    A cutter rolls over a large flat facet as it is, however far smooth normals lean over it. Steep facets amid others
+    are noise of the mesh: where the smooth normals of all corners are within the region, they are a part of it.
+    """
+    own = region.faces(patch.facet_normals) >= -SAME_ANGLE
+    amid = (region.faces(patch.normals) >= 0.0).all(axis=1)
+    return patch.only(own | amid).where_normals(region.faces)
 
 
 def _ridge(options: PathOptions, tool: Tool) -> float:
