@@ -124,13 +124,9 @@ def test_where_the_tool_body_touches_an_upright_tool_comes_first(make_job):
 LEFT_ALONE = frozenset((SURFACE_LEFT,))
 
 
-@pytest.mark.parametrize("known", [frozenset(), LEFT_ALONE], ids=["first plan tells", "run tells"])
-def test_axes_that_leave_too_much_are_not_tried_at_other_places(known, tmp_path, monkeypatch):
-    """Wherever the part is, they leave it: other axes are tried, and less of the surface."""
-
-    def plan(job: Job, _) -> Tried:
-        planned.append(job)
-        return Tried("placement", failed=LEFT_ALONE)
+@pytest.fixture
+def all_fits(monkeypatch):
+    """By estimate every setting fits."""
 
     def estimated(_, kinds, *__, **___):
         return SimpleNamespace(
@@ -139,6 +135,17 @@ def test_axes_that_leave_too_much_are_not_tried_at_other_places(known, tmp_path,
 
     monkeypatch.setattr(Settings, "_best", estimated)
     monkeypatch.setattr(Settings, "beyond_a_single_place", lambda _: ())
+
+
+@pytest.mark.usefixtures("all_fits")
+@pytest.mark.parametrize("known", [frozenset(), LEFT_ALONE], ids=["first plan tells", "run tells"])
+def test_axes_that_leave_too_much_are_not_tried_at_other_places(known, tmp_path):
+    """Wherever the part is, they leave it: other axes are tried, and less of the surface."""
+
+    def plan(job: Job, _) -> Tried:
+        planned.append(job)
+        return Tried("placement", failed=LEFT_ALONE)
+
     planned: list[Job] = []
     job = Job.load(REFUSED["table too low"].write(tmp_path))
     options = AdviceOptions(plans=5, replans=3)
@@ -150,21 +157,15 @@ def test_axes_that_leave_too_much_are_not_tried_at_other_places(known, tmp_path,
     assert len(axes) == len({str(axis) for axis in axes})
 
 
+@pytest.mark.usefixtures("all_fits")
 @pytest.mark.parametrize(("failed", "there"), [("component kept", 1), ("tip deviation", 2)])
-def test_another_place_is_tried_next_where_a_program_is_near_a_singular_surface(failed, there, tmp_path, monkeypatch):
+def test_another_place_is_tried_next_where_a_program_is_near_a_singular_surface(failed, there, tmp_path):
     """Other tool axes hardly help there; for other claims a second one is tried at the same place."""
 
     def plan(job: Job, _) -> Tried:
         planned.append(job)
         return Tried("verdict", failed=frozenset((failed,)))
 
-    def estimated(_, kinds, *__, **___):
-        return SimpleNamespace(
-            margin=0.2, shortfalls=(), samples=kinds[0], candidate=SimpleNamespace(transform=RigidTransform.identity())
-        )
-
-    monkeypatch.setattr(Settings, "_best", estimated)
-    monkeypatch.setattr(Settings, "beyond_a_single_place", lambda _: ())
     planned: list[Job] = []
     job = Job.load(REFUSED["table too low"].write(tmp_path))
     advised(job, job_machine(job), job_mesh(job), None, plan, AdviceOptions(plans=4), silent)

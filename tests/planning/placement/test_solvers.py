@@ -9,12 +9,13 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning.placement.ipopt import IpoptSolver
 from pentapod.planning.placement.sampling import SamplingOptions, first_candidate, first_guesses
 from pentapod.planning.placement.search import search
-from pentapod.planning.placement.sequential import SequentialSolver
+from pentapod.planning.placement.sequential import SequentialOptions, SequentialSolver
 from pentapod.planning.problem.formulation import stepped
 from pentapod.planning.problem.linear_model import REACH
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
+from pentapod.planning.problem.weights import NEEDED_MARGIN
 from pentapod.planning.tool_axis.smoothing import OPTIONS
 from pentapod.planning.tool_axis.spline import AxisSpline
 
@@ -39,6 +40,16 @@ def raised(problem, start):
 
 def test_a_first_candidate_keeps_the_cone(problem, start):
     assert problem.steepness(start.coefficients).max() <= 1.0 + 1e-12
+
+
+def test_steps_end_where_they_hardly_raise_a_margin_that_fits(problem, start, raised):
+    """The first two steps from a margin that fits are too few for a share of ten; without a share all are made."""
+    ends = [
+        SequentialSolver(problem, True, options=SequentialOptions(recent=2, least_gain=share)).raise_margin(start)
+        for share in (10.0, 0.0)
+    ]
+    assert start.smallest < NEEDED_MARGIN <= ends[0].smallest < 0.99 * ends[1].smallest
+    assert raised.smallest >= 0.997 * ends[1].smallest
 
 
 @pytest.mark.slow

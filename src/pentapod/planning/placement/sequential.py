@@ -34,8 +34,8 @@ class SequentialOptions:
 
     waypoints: used in every step, evenly spaced, beside those where the margins are smallest, up to `lowest` for each
     kind; all, where there are no more than twice as many. All are checked when the steps have ended. steps, rounds:
-    maximum of steps, and of checks at all waypoints. recent, gain: steps also end where so many of them have raised a
-    margin that fits by less than this share. tolerance: decrease of the smallest margin at all waypoints that
+    maximum of steps, and of checks at all waypoints. recent, least_gain: steps also end where so many of them have
+    raised a margin that fits by less than this share. tolerance: decrease of the smallest margin at all waypoints that
     calls for another round. least: smaller predicted increases, and smaller trust regions, end the steps. rough: the
     predicted increase where candidates are compared, and `astray` the tolerance then. hope: predicted increases below
     the margin to beat at which steps end then. known_m, known_rad: from another candidate, as near steps end that do
@@ -48,7 +48,7 @@ class SequentialOptions:
     lowest: int = 24
     steps: int = 60
     recent: int = 10
-    gain: float = 3e-3
+    least_gain: float = 3e-3
     rounds: int = 10
     tolerance: float = 1e-4
     least: float = 1e-5
@@ -154,7 +154,7 @@ class SequentialSolver:
 
     def _stalls(self, before: float, smallest: float) -> bool:
         """Return whether a margin that fits has hardly grown since it was `before`."""
-        return smallest >= NEEDED_MARGIN and smallest - before < self.options.gain * smallest
+        return smallest >= NEEDED_MARGIN and smallest - before < self.options.least_gain * smallest
 
     def _leads_to_no_more(self, at: Candidate, predicted: float, others: Sequence[Candidate]) -> bool:
         """Return whether steps from here are expected to end below another candidate, or at it."""

@@ -20,6 +20,7 @@ from pentapod.mesh.region import Region
 from pentapod.toolpath.lines.scallop import scallop_height
 from pentapod.toolpath.linking.partition import Piece, cutting_intervals
 from pentapod.toolpath.options import CoverOptions, PathOptions
+from pentapod.toolpath.strategies.registry import rolls_over
 from pentapod.toolpath.strategies.waterline import WaterlineOptions
 from pentapod.toolpath.toolpath import Toolpath
 
@@ -89,7 +90,10 @@ class Coverage(Value):
         """
         if left is None and not isinstance(options, CoverOptions):
             return cls.nothing(f"{type(options).__name__.removesuffix('Options').lower()}: lines that cover no region")
-        region = _as_facets_lean(Patch.whole(part).in_box(options.region), options.region)
+        region = Patch.whole(part).in_box(options.region)
+        if rolls_over(tool, options):
+            region = _as_facets_lean(region, options.region)
+        region = region.where_normals(options.region.faces)
         if isinstance(options, WaterlineOptions):
             upright, flattest = np.asarray(options.upright), options.shallowest
             region = region.steeper(upright, flattest)
@@ -134,14 +138,14 @@ class Coverage(Value):
 
 
 def _as_facets_lean(patch: Patch, region: Region) -> Patch:
-    """Return the part of a patch within the angle of a region, by smooth normals, without facets that are steeper.
+    """Return a patch without the facets that are steeper than a region.
 
-    A cutter rolls over a large flat facet as it is, however far smooth normals lean over it. Steep facets amid others
-    are noise of the mesh: where the smooth normals of all corners are within the region, they are a part of it.
+    A ball rolls over a large flat facet as it is, however far smooth normals lean over it. Steep facets amid others
+    are noise of the mesh: where the smooth normals of all corners are within the region, they stay.
     """
     own = region.faces(patch.facet_normals) >= -SAME_ANGLE
     amid = (region.faces(patch.normals) >= 0.0).all(axis=1)
-    return patch.only(own | amid).where_normals(region.faces)
+    return patch.only(own | amid)
 
 
 def _ridge(options: PathOptions, tool: Tool) -> float:
