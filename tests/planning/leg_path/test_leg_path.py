@@ -21,6 +21,7 @@ from pentapod.planning.leg_path.leg_path import LegPath, leg_path
 from pentapod.planning.leg_path.tolerances import tolerances_beside
 from pentapod.planning.leg_path.tool_curve import ToolCurve
 from pentapod.planning.placement.placed_path import PlacedPath, Placement
+from pentapod.timing import Trajectory, retime
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 TOLERANCE, AXIS_TOLERANCE = 20e-6, np.radians(0.1)
@@ -247,6 +248,20 @@ def test_a_sharp_reversal_stops(desk):
     path = leg_path(placed_on(desk, toolpath), desk, path_tolerance=TOLERANCE, axis_tolerance=AXIS_TOLERANCE)
     assert isinstance(path, LegPath)
     assert len(path.pieces) == 2
+
+
+@pytest.mark.parametrize("width", [2e-10, 1e-9, 2.7e-9, 1e-7, 1e-6, 1.9e-6, 2e-6, 3e-6, 20e-6])
+@pytest.mark.parametrize("tilt_centre", [0.0, 0.003])
+def test_a_reversal_over_a_short_way_is_one_corner(desk, width, tilt_centre):
+    """No waypoint of it turns by more than a right angle. The curve bent in nanometres: no time law was found."""
+    tips, axes = fan([[0, 0, 0], [0.01, 0, 0], [0.01, width, 0], [0.0, width, 0]], np.zeros(4))
+    toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),), tilt_centre)
+    path = leg_path(placed_on(desk, toolpath), desk, path_tolerance=20e-6, axis_tolerance=AXIS_TOLERANCE)
+    assert isinstance(path, LegPath)
+    assert len(path.pieces) == (1 if width > 0.1 * 20e-6 else 2)
+    trajectory = retime(path, desk)
+    assert isinstance(trajectory, Trajectory)
+    assert trajectory.duration < 1.02 * 2 * (0.01 / 0.01 + 0.01)
 
 
 def test_duplicate_waypoints_are_passed_over(desk):

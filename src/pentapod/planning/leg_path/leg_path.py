@@ -17,9 +17,10 @@ from pentapod.base.values import Result, Value
 from pentapod.geometry.fillet import BULGE, blended, knots_between
 from pentapod.kinematics.robot import Robot
 from pentapod.machine.machine import Machine
-from pentapod.planning.leg_path.tool_curve import REORIENTATION_LEVER_M, ToolCurve, TooSharpError
+from pentapod.planning.leg_path.stops import with_corners
+from pentapod.planning.leg_path.tool_curve import ToolCurve, TooSharpError
 from pentapod.planning.placement.placed_path import PlacedPath
-from pentapod.toolpath.toolpath import Segment, SegmentKind
+from pentapod.toolpath.toolpath import SegmentKind
 
 STOP_ANGLE = float(np.radians(135.0))
 """Turn of the path above which the motion stops at a corner; blending it would need a very low speed."""
@@ -196,7 +197,9 @@ def leg_path(
     points, u = points[keep], np.concatenate([[0.0], np.cumsum(steps[moving])])
     segment = toolpath.segment_of_interval[moving]
     stops = np.zeros(len(points), dtype=np.bool_)
-    stops[1:-1] = _stops(points, toolpath.tilt_centre, segment, toolpath.segments, stop_angle)
+    rapid = np.array([each.kind is SegmentKind.RAPID for each in toolpath.segments])[segment]
+    changes, near = rapid[1:] != rapid[:-1], STRAIGHT_SHARE * tolerances[0]
+    stops[1:-1] = with_corners(changes, u, points, toolpath.tilt_centre, stop_angle, near)
     dwells = np.zeros(len(points))
     for waypoint, seconds in zip(toolpath.starts, toolpath.dwells, strict=True):
         if seconds is not None:
@@ -283,24 +286,3 @@ def _distance_to_origin(a: Floats, b: Floats) -> Floats:
     step = b - a
     foot = -np.einsum("kj,kj->k", a, step) / np.maximum(np.einsum("kj,kj->k", step, step), 1e-300)
     return np.linalg.norm(a + np.clip(foot, 0.0, 1.0)[:, None] * step, axis=1)
-
-
-def _stops(points: Floats, tilt_centre: float, segment: Ints, segments: tuple[Segment, ...], angle: float) -> Bools:
-    """Return for each inner waypoint (N − 2,) whether it is a stop: a change from or to rapids, or a sharp corner.
-
-    points (N, 6): tilt centres and axes. angle: least turn of a sharp corner, radians. A tip that a ball keeps on an
-    edge goes to and fro by micrometres: it has a corner only where its path has one together with that of the axis.
-    """
-    rapid = np.array([s.kind is SegmentKind.RAPID for s in segments])[segment]
-    tilt_centres, axes = points[:, :3], points[:, 3:]
-    tips = np.hstack([tilt_centres - tilt_centre * axes, REORIENTATION_LEVER_M * axes])
-    return (rapid[1:] != rapid[:-1]) | _turns(tilt_centres, angle) | _turns(tips, angle)
-
-
-def _turns(points: Floats, angle: float) -> Bools:
-    """Return for each inner point (N − 2,) of a polyline whether it turns by more than an angle there."""
-    step = np.diff(points, axis=0)
-    length = np.linalg.norm(step, axis=1)
-    moves = length > 1e-9
-    sharp = (step[1:] * step[:-1]).sum(axis=1) < np.cos(angle) * length[1:] * length[:-1]
-    return sharp & moves[1:] & moves[:-1]
