@@ -84,7 +84,7 @@ class Advice(Value):
     @property
     def keeps(self) -> str:
         """What is kept, in words."""
-        share = "all" if self.kept > 0.9995 else f"{100.0 * self.kept:.2g} %"
+        share = "all" if self.kept > 0.9995 else f"{100.0 * self.kept:.{3 if self.kept > 0.99 else 2}g} %"
         return f"{share} of the area" + ("" if self.whole else ", of another part")
 
     def __str__(self) -> str:

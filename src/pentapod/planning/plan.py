@@ -196,10 +196,15 @@ def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: F
 
 
 def _refusal(toolpath: Toolpath, problem: PlacementProblem, best: Candidate) -> UnplacedPath:
-    values, leans = best_tilted_margins(problem.samples, best.margins, best.transform)
-    if (values.min(axis=1) >= NEEDED_MARGIN).all():  # each waypoint fits by itself, but not with one smooth field
-        leans = problem.leans(best.coefficients)
-        poses = problem.samples.machine_poses(best.transform, problem.axes(best.coefficients))
-        values = best.margins(*poses, best.transform)
+    """Return why a path does not fit at the best placement found; what fits as it leans there needs no other tilts."""
+    leans = problem.leans(best.coefficients)
     attempt = _path(toolpath, problem, best, leans, "best attempt")
+    values = attempt.margins
+    bad = np.flatnonzero(values.min(axis=1) < NEEDED_MARGIN)
+    by_itself, tilted = best_tilted_margins(problem.samples.at(bad), best.margins, best.transform)
+    if (by_itself.min(axis=1) < NEEDED_MARGIN).any():  # else each fits by itself, but not with one smooth field
+        leans[bad] = tilted
+        attempt = _path(toolpath, problem, best, leans, "best attempt")
+        values = values.copy()
+        values[bad] = by_itself
     return refusal(values, attempt, best.margins, NEEDED_MARGIN, fixed=not problem.constraints.moves)

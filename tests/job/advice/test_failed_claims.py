@@ -19,9 +19,9 @@ def trials(folder, name, claim, value=None, **options):
     return trials_of(Job.load(REFUSED[name].write(folder)), claim, value, **options)
 
 
-def trials_of(job, claim, value=None, **options):
+def trials_of(job, claim, value=None, also=(), **options):
     machine, mesh, told = job_machine(job), job_mesh(job), []
-    failed = {claim.name: Certificate(claim.name, False, value, 0.1, "%", Place(), "")}
+    failed = {each.name: Certificate(each.name, False, value, 0.1, "%", Place(), "") for each in (claim, *also)}
     path, _ = job_toolpath(job, mesh, machine=machine)
     given = AdviceOptions(surface_points=4000, **options)
     return job, list(FailedClaims(job, machine, mesh, path, failed, given, told.append).all()), told
@@ -67,3 +67,22 @@ def test_gouges_that_were_only_reported_are_left_out(tmp_path):
 def test_a_feed_that_is_not_reached_is_lowered(tmp_path):
     job, (trial,), _ = trials(tmp_path, "too far", slowness.CLAIMS[0], 0.5)
     assert trial.changes == {"feed": {"cut_mm_min": 0.6 * job.feed.cut_mm_min}}
+
+
+@pytest.mark.parametrize("percent", [0.11, 0.19034, 1.6])
+def test_a_little_that_is_left_may_stay(tmp_path, percent):
+    """The share is a little more than was found, and what is asked for besides stays as it is."""
+    _, found, _ = trials(tmp_path, "passes too far apart", surface_left.CLAIMS[0], percent, nearer=(), thinner=0.99)
+    (trial,) = (each for each in found if "left_share" in each.changes.get("tolerance", {}))
+    share = trial.changes["tolerance"]["left_share"]
+    assert 1.1 * percent < 100.0 * share < 1.4 * percent
+    assert trial.changes == {"tolerance": {"left_share": share}}
+    assert trial.kept == 1.0 - share
+    assert trial.words.startswith("at most ")
+
+
+@pytest.mark.parametrize(("percent", "also"), [(1.7, ()), (0.2, slowness.CLAIMS)])
+def test_much_that_is_left_may_not_stay_nor_a_little_beside_other_faults(tmp_path, percent, also):
+    name, given = "passes too far apart", {"nearer": (), "thinner": 0.99}
+    _, found, _ = trials(tmp_path, name, surface_left.CLAIMS[0], percent, also=also, **given)
+    assert all("left_share" not in each.changes.get("tolerance", {}) for each in found)

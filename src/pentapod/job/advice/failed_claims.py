@@ -119,11 +119,16 @@ class FailedClaims:
 
     def _leaving_less(self) -> Iterator[Trial]:
         """Yield changes that leave less than the job now allows, where that can be estimated."""
-        most = self.options.surely * float(self.job.tolerance.left_share)
+        most, accepted = self.options.surely * float(self.job.tolerance.left_share), False
         for words, changes in self._finer():
             self.tell(words)
             if self._left(changes) <= most:
                 yield Trial(words, changes, 1.0, 1.0)
+                if not accepted:  # the other ways cost a plan each, and are much like the one that failed
+                    yield from self._as_left()
+                accepted = True
+        if not accepted:
+            yield from self._as_left()
         if (regions := Regions.of(self.job, self.mesh, self._tool, self.toolpath, self.options)) is None:
             return
         self.tell("a smaller region_angle_deg")
@@ -132,6 +137,15 @@ class FailedClaims:
             if smaller is not None and self._left(smaller.changes, self.toolpath) <= most:
                 yield Trial(smaller.words, smaller.changes, smaller.share, smaller.share)
                 return
+
+    def _as_left(self) -> Iterator[Trial]:
+        """Yield the program as it is, where nothing but a little that is left on the surface stands against it."""
+        left = 1e-2 * (self.failed[_LEFT].value or 0.0)
+        share = _longer(self.options.more * left)
+        if set(self.failed) == {_LEFT} and 0.0 < share <= self.options.little:
+            words = f"at most {100.0 * share:.3g} % of the region stays as it is"
+            self.tell(words)
+            yield Trial(words, {"tolerance": {"left_share": share}}, 1.0 - share, 1.0 - share)
 
     def _finer(self) -> Iterator[tuple[str, Changes]]:
         """Yield waterlines on walls, passes nearer together with the same bound of what is left, a smaller cutter."""
@@ -209,6 +223,12 @@ def _cut_length(toolpath: Toolpath) -> float:
     steps = np.linalg.norm(np.diff(toolpath.tilt_centres, axis=0), axis=1)
     kinds = np.array([toolpath.segments[k].kind is SegmentKind.CUT for k in toolpath.segment_of_interval])
     return float(steps[kinds].sum())
+
+
+def _longer(share: float) -> float:
+    """Return a share with two digits, rounded up."""
+    size = 10.0 ** (np.floor(np.log10(max(share, 1e-6))) - 1.0)
+    return float(f"{np.ceil(share / size) * size:.2g}")
 
 
 def _shorter(length: float) -> float:

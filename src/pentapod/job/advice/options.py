@@ -86,6 +86,8 @@ class AdviceOptions(Value):
     surface_points: int = 20_000
     near_share: float = 0.05
     surely: float = 0.8
+    little: float = 0.02
+    more: float = 1.2
 
 
 OPTIONS = AdviceOptions()

@@ -14,10 +14,10 @@ from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.base.values import Value
 from pentapod.job.advice.failed_claims import FailedClaims
 from pentapod.job.advice.options import AdviceOptions, Tried
-from pentapod.job.advice.settings import TOUCHES, Settings, Tell, joined, merged
+from pentapod.job.advice.settings import ABOVE_THE_TIP, TOUCHES, Settings, Tell, joined, merged
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.advice.starts import starts
-from pentapod.job.advice.trials import FEWEST, Because, Ended, Trial, Trials
+from pentapod.job.advice.trials import FEWEST, Trial, Trials
 from pentapod.job.build.other_ways import may_stand
 from pentapod.job.build.tool import job_tool
 from pentapod.job.schema.job import Job
@@ -99,8 +99,12 @@ def advised(
             tried[words] = None
             shown.estimate(words)
 
-    about = (lambda words: reasons.update({words: None}), lambda: ended[-1], toolpath is not None and not short)
-    trials = _trials(job, machine, mesh, toolpath, options, tell, *about, otherwise)
+    because, last = (lambda words: reasons.update({words: None}), lambda: ended[-1])
+    own = partial(
+        Trials, because=because, ended=last, placed=toolpath is not None and not short, otherwise=otherwise,
+        meets=bool(short) and all(each.constraint.startswith(ABOVE_THE_TIP) for each in short),
+    )  # fmt: skip
+    trials = _trials(job, machine, mesh, toolpath, options, tell, own, partial(Trials, because=because, ended=last))
     if toolpath is not None:
         claims = FailedClaims(job, machine, mesh, toolpath, failed, options, tell)
         touches = any(each.constraint.startswith(TOUCHES) for each in short)
@@ -171,12 +175,10 @@ def _trials(
     toolpath: Toolpath | None,
     options: AdviceOptions,
     tell: Tell,
-    because: Because,
-    ended: Ended,
-    placed: bool,
-    otherwise: frozenset[str],
+    own: Callable[[Settings], Trials],
+    other: Callable[[Settings], Trials],
 ) -> Iterator[Trial]:
-    """Yield the trials of the jobs to begin with."""
+    """Yield the trials of the jobs to begin with. own: makes those of the job itself; other: of a changed one."""
     for start in starts(job, machine, mesh, options, has_toolpath=toolpath is not None):
         tell(start.words)
         tool = job_tool(start.job, machine)
@@ -188,8 +190,6 @@ def _trials(
         if sketch is None or len(sketch.contacts) < FEWEST:
             continue
         settings = Settings(start.job, machine, start.mesh, sketch, path, options, tell)
-        own = not start.changes
-        trials = Trials(settings, because, ended, placed=placed and own, otherwise=otherwise if own else frozenset())
-        for trial in trials.all(own=bool(start.changes)):
+        for trial in (other if start.changes else own)(settings).all(own=bool(start.changes)):
             words, changes = joined(start.words, trial.words), merged(start.changes, trial.changes)
             yield replace(trial, words=words, changes=changes, kept=start.kept * trial.kept)

@@ -35,6 +35,9 @@ Tell = Callable[[str], None]
 TOUCHES = ("tool body", "the tool touches")
 """Beginnings of the names of limits and claims that keep shank, stem and holder from the part."""
 
+ABOVE_THE_TIP = (*TOUCHES, "spindle touches")
+"""Beginnings of the names of limits that depend on the tool's direction on the part, and not on where this stands."""
+
 
 @dataclass(frozen=True, eq=False)
 class Setting:

@@ -49,7 +49,8 @@ class Trial:
 class Trials:
     """The trials of one job, from estimates for its settings. placed: whether its own plan had a place for the part.
 
-    otherwise: claims that failed in the other way in which a run planned it.
+    otherwise: claims that failed in the other way in which a run planned it. meets: whether nothing but the part that
+    the tool or the spindle touches stood against its own plan.
     """
 
     settings: Settings
@@ -57,6 +58,7 @@ class Trials:
     ended: Ended
     placed: bool = False
     otherwise: frozenset[str] = frozenset()
+    meets: bool = False
 
     @property
     def options(self) -> AdviceOptions:
@@ -78,15 +80,14 @@ class Trials:
         touching = next((setting for setting in settings.looked_at if setting.touches), None)
         if not too_wide:
             yield from self._scarcely(own)
-        for base in bases:
-            # More set-ups are for parts that have no place in one: a program that fails in one fails again.
-            programmed = base in self._programmed or base.axis.words in self._failing
-            if not programmed and not (self.placed and not base.words):
-                yield from self._setups(base)
+        if not self.meets:
+            yield from self._more_setups(bases)
         for base in bases:
             yield from self._smaller(base)
         if touching is not None:
             yield from self._top(touching)
+        if self.meets:  # in another place the tool meets the part again, unless it leans there
+            yield from self._more_setups(bases)
         if bases:
             yield from self._scales(bases[0])
         nearest = touching or settings.nearest
@@ -230,6 +231,13 @@ class Trials:
             return []
         boxes = (boxed(factor * fits) for factor in (self.options.spare, self.options.smaller))
         return [box for box in boxes if box is not None]
+
+    def _more_setups(self, bases: list[Setting]) -> Iterator[Trial]:
+        """Yield more set-ups, for parts that have no place in one: a program that fails in one fails again."""
+        for base in bases:
+            programmed = base in self._programmed or base.axis.words in self._failing
+            if not programmed and not (self.placed and not base.words):
+                yield from self._setups(base)
 
     def _setups(self, base: Setting) -> Iterator[Trial]:
         """Yield the smallest number of set-ups whose slabs fit."""
