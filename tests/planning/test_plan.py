@@ -12,6 +12,7 @@ from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
 from pentapod.planning import PlacedPath, PlacementConstraints, plan
 from pentapod.planning.limits.margins import Margins
+from pentapod.planning.placement.placed_path import UnplacedPath
 from pentapod.planning.placement.sampling import best_tilted_margins
 from pentapod.planning.plan import NEEDED_MARGIN
 from pentapod.planning.problem.formulation import cayley
@@ -140,6 +141,24 @@ def test_placement_out_of_reach_is_refused_with_the_true_shortfall(desk, cap, pl
             break
     else:
         pytest.fail(f"no leg is named: {answer}")
+
+
+def test_a_refusal_names_the_waypoints_that_no_tilt_makes_fit(desk, cap, placed):
+    """Against the margins at all tilts of a grid at all waypoints; the axes found fit at some more."""
+    t = placed.placement.transform
+    aside = RigidTransform(t.rotation, t.translation + np.array([0.1, 0.0, 0.0]))
+    given = PlacementConstraints.fixture([aside])
+    answer = plan(cap, desk, tilt=TILT, constraints=given, component=placed.component)
+    assert isinstance(answer, UnplacedPath)
+    named = {k for each in answer.diagnosis for a, b in each.waypoints for k in range(a, b + 1)}
+    samples = ToolpathSamples.of(cap, TILT)
+    values, _ = best_tilted_margins(samples, Margins.of(desk, placed.component), aside)
+    tried = set(np.flatnonzero(values.min(axis=1) < NEEDED_MARGIN).tolist())
+    found = set(np.flatnonzero(answer.attempt.margins.min(axis=1) < NEEDED_MARGIN).tolist())
+    assert 0 < len(named) < len(cap)
+    assert named == found
+    assert named <= tried
+    assert len(tried - named) < 0.1 * len(tried)
 
 
 def test_oversize_part_is_refused(desk):

@@ -172,9 +172,19 @@ def test_another_place_is_tried_next_where_a_program_is_near_a_singular_surface(
     assert [each.placement == job.placement for each in planned].index(False) == there
 
 
-@pytest.mark.parametrize(("stage", "split"), [("placement", True), ("verdict", False)])
-def test_a_program_that_fails_is_not_split_into_setups(stage, split, tmp_path, monkeypatch):
-    """What has a place in one set-up is planned in one, and fails again; what fits by a hair is planned before less."""
+@pytest.mark.parametrize(
+    ("stage", "limit", "split"),
+    [
+        ("placement", "leg 1 too short", True),
+        ("verdict", "leg 1 too short", False),
+        ("placement", "spindle touches the part", False),
+    ],
+)
+def test_a_program_that_fails_is_not_split_into_setups(stage, limit, split, tmp_path, monkeypatch):
+    """What has a place in one set-up is planned in one, and fails again; what fits by a hair is planned before less.
+
+    Where the spindle touches the part it does so in every set-up: less of the part is planned before.
+    """
 
     def estimated(_, kinds, *__, **___):
         one = bool((kinds[0].nominal == kinds[0].nominal[0]).all())
@@ -193,7 +203,7 @@ def test_a_program_that_fails_is_not_split_into_setups(stage, split, tmp_path, m
     job = Job.load(REFUSED["dome of 60 deg, no cone"].write(tmp_path))
     machine, mesh = job_machine(job), job_mesh(job)
     toolpath = job_toolpath(job, mesh, machine=machine)[0]
-    short = [Shortfall("leg 1 too short", ((0, 1),), 1.0, "mm")]
+    short = [Shortfall(limit, ((0, 1),), 1.0, "mm")]
     advised(job, machine, mesh, toolpath, plan, AdviceOptions(plans=4), lambda *_: None, short=short)
     assert [each.axis.mode for each in planned[:2]] == ["fixed", "auto"]
     assert {(each.part.region_box_mm, each.placement.setups) for each in planned[:2]} == {(None, 1)}
