@@ -95,10 +95,10 @@ def _changed(attempt: Attempt, last: Outcome, before: Mend, mend: Mend) -> Attem
     )
 
 
-def _otherwise(attempt: Attempt, failed: Outcome, job: Job, words: str) -> Outcome:
+def _otherwise(attempt: Attempt, failed: Outcome, job: Job, words: str, before: Outcome | None = None) -> Outcome:
     """Go back after a run that failed, and plan the job as it is done in another way, of which `words` are said.
 
-    Returns the failed outcome where that does not pass, which then says so.
+    Returns the failed outcome where that does not pass, which then says so. before: an earlier one that left too much.
     """
     task, runner, program = attempt.task, StageRunner(attempt.runner.progress), attempt.withheld()
     runner.stages += [stage for stage in attempt.runner.stages if stage.name in ("mesh", ANOTHER_WAY)]
@@ -113,8 +113,9 @@ def _otherwise(attempt: Attempt, failed: Outcome, job: Job, words: str) -> Outco
     outcome = again.planned()
     if not outcome.passed:
         outcome = mended(again, outcome)
-    if not outcome.passed and (other := other_way(job, outcome, failed)) is not None:
-        outcome = _otherwise(again, outcome, *other)
+    last = failed if SURFACE_LEFT in failures(failed.verdict) else before
+    if not outcome.passed and (other := other_way(job, outcome, last)) is not None:
+        outcome = _otherwise(again, outcome, *other, last)
     elif outcome.passed and stands(job):  # what it does not reach
         left = next(each.method for each in outcome.verdict.certificates if each.claim == SURFACE_LEFT)
         runner.stages.append(Stage("left", 0.0, None, f"{SURFACE_LEFT}: {left.rsplit('; ', 1)[-1]}"))
