@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import KDTree
 
 from pentapod import Mesh, RasterOptions, Region
 from pentapod.cutters.ball import BallCutter
@@ -17,6 +18,7 @@ from pentapod.toolpath.surfaces.ball_centres import smoothed
 from pentapod.toolpath.surfaces.drive_surface import DriveSurface
 from pentapod.toolpath.surfaces.options import DriveOptions, OverhangOptions
 from pentapod.toolpath.surfaces.part_surface import PartSurface
+from toolpath_surfaces import grid
 
 R, CHORDAL, UP = 3e-3, 5e-6, np.array([0.0, 0.0, 1.0])
 
@@ -221,6 +223,39 @@ def test_the_ball_does_not_roll_around_an_open_border_but_bridges_a_small_hole()
     assert patch.areas.sum() == pytest.approx(0.04 * 0.03, rel=0.02)
     assert patch.topology.border_loops == 1
     np.testing.assert_allclose(patch.vertices[:, :2].max(axis=0), [0.04, 0.03], atol=0.05 * R)
+
+
+def bumps(holes):
+    """A sheet of 40 mm with bumps as narrow as the ball; holes: with six ragged ones in it."""
+    vertices, faces = grid(lambda x, y: 1.6e-3 * np.sin(x / 2.2e-3) * np.cos(y / 2.6e-3), width=0.04, cells=160)
+    if holes:
+        centres = np.random.default_rng(3).uniform(-15e-3, 15e-3, (6, 2))
+        aside = vertices[faces].mean(axis=1)[:, None, :2] - centres
+        angle = np.arctan2(aside[..., 1], aside[..., 0])
+        wild = 3.5e-3 * (1.0 + 0.35 * np.sin(5.0 * angle) + 0.25 * np.sin(11.0 * angle + 1.0))
+        faces = faces[(np.linalg.norm(aside, axis=2) > wild).all(axis=1)]
+    return Mesh.of(vertices, faces)
+
+
+@pytest.mark.parametrize("holes", [True, False])
+def test_hollows_at_a_ragged_border_are_cut_by_a_ball_that_rests_on_it(holes):
+    """Elsewhere it stays where it was. A ball cuts what is within its radius, here 0.2 mm above the part."""
+    mesh = bumps(holes)
+    sheets = [DriveSurface.of(mesh, R, UP, DriveOptions(rolls=share)) for share in (0.0, DriveOptions().rolls)]
+    patches = [sheet.patch(Region()) for sheet in sheets]
+    assert (len(patches[1].faces) > len(patches[0].faces)) == holes
+    above = mesh.vertices[mesh.faces].mean(axis=1) + 0.2e-3 * mesh.facet_normals
+    reached = [KDTree(patch.vertices).query(above)[0] < R for patch in patches]
+    assert not (reached[0] & ~reached[1]).any()
+    hollows = above[reached[1] & ~reached[0]]
+    assert (len(hollows) >= 10) == holes
+    if holes:
+        lines = raster_paths(sheets[1], RasterOptions(stepover=1e-3)).passes
+        centres = sheets[1].centres.exact(lines, CHORDAL, CHORDAL)
+        assert gaps(mesh, centres.points).min() > R - 1e-6
+        rows = np.flatnonzero(centres.within)
+        between = dense(list(np.stack([centres.points[rows], centres.points[rows + 1]], axis=1)))
+        assert np.mean(KDTree(between).query(hollows)[0] < R) > 0.9
 
 
 def test_normals_turn_evenly_where_the_offset_has_a_crease():

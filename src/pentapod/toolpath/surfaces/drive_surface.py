@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats
 from pentapod.geometry.directions import tangent_frame
@@ -115,7 +116,24 @@ class DriveSurface(RolledSurface):
                     contacts = self.contacts(patch.vertices)
                     patch, _ = patch.above(side * (contacts[:, axis] - bound[axis]), 0.0)
         patch = self._facing(patch, region)
-        return patch if self.part.topology.watertight else patch.above(-self._beyond_border(patch), 0.0)[0]
+        if self.part.topology.watertight:
+            return patch
+        beyond = self._beyond_border(patch)
+        beyond[self._over_hollows(patch, beyond, region)] -= self.options.rolls * self.radius
+        return patch.above(-beyond, 0.0)[0]
+
+    def _over_hollows(self, patch: Patch, beyond: Floats, region: Region) -> Bools:
+        """Return the vertices (V,) beyond the part's border about hollows that the ball only cuts from there.
+
+        Beside ragged borders, as scans have them, there are hollows in which it rests on the border itself.
+        """
+        rolls = (beyond > 0.0) & (beyond <= self.options.rolls * self.radius)
+        normals, middles = self.part.facet_normals, self.part.vertices[self.part.faces].mean(axis=1)
+        above = (middles + self.options.hollow * self.radius * normals)[region.faces(normals, 0.5 * np.pi) >= 0.0]
+        above = above[_near(patch.vertices[rolls], above, self.radius)]
+        inside, about = patch.vertices[beyond <= 0.0], self.options.about_hollows * self.radius
+        missed = above[~_near(inside, above, self.radius) & _near(inside, above, about)]
+        return (beyond > 0.0) & _near(missed, patch.vertices, about)
 
     def _normals(self, points: Floats) -> Floats:
         away = self.centres.tree.closest(points)[1]
@@ -165,6 +183,13 @@ class DriveSurface(RolledSurface):
         gap, away, facet = self.centres.tree.closest(points)
         upright = np.einsum("ni,ni->n", self.part.facet_normals[self.centres.tree.facets[facet]], away)
         return points - away, np.sqrt(np.maximum(gap**2 - upright**2, 0.0))
+
+
+def _near(centres: Floats, points: Floats, distance: float) -> Bools:
+    """Return which points (N, 3) are nearer than a distance to one of some centres (M, 3)."""
+    if not len(centres):
+        return np.zeros(len(points), dtype=np.bool_)
+    return np.asarray(KDTree(centres).query(points, distance_upper_bound=distance)[0] < np.inf)
 
 
 def _window(part: Mesh, radius: float, view: Floats, options: DriveOptions, region: Region) -> Window | None:
