@@ -38,11 +38,23 @@ def proposed(folder, shape, name="part.stl"):
     return Job.load(folder / "part.toml"), proposal
 
 
+def with_debris(shape, count=3):
+    """A shape and a few pieces of 2 units beside it, of two facets each."""
+    corners = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.1], [2.0, 2.0, 0.0], [0.0, 2.0, 0.1]])
+    pieces = [
+        trimesh.Trimesh(corners + np.array([70.0 + 5.0 * k, 9.0 * k, 4.0]), [[0, 1, 2], [0, 2, 3]])
+        for k in range(count)
+    ]
+    return trimesh.util.concatenate([shape, *pieces])
+
+
 SHAPES = {
     "dome": (dome, {}),
     "dome in metres": (lambda: dome(1e-3), {"unit": "m"}),
     "dome in inches": (lambda: dome(1 / 25.4), {"unit": "inch"}),
     "dome wound downwards": (lambda: dome(turn=lambda facets: facets[:, ::-1]), {"flip": True}),
+    "scan with debris": (lambda: with_debris(dome()), {"least_body_mm": 11.2}),
+    "two open parts": (lambda: with_debris(dome(0.05)), {}),
     "dome on its side": (lambda: dome(turn=lambda f: f[..., [2, 0, 1]]), {"region_direction": (1.0, 0.0, 0.0)}),
     "plate on edge": (lambda: trimesh.creation.box((90, 4, 70)), {"region_direction": (0.0, 1.0, 0.0)}),
     "block": (lambda: trimesh.creation.box((80, 60, 31)), {}),
@@ -59,7 +71,7 @@ def inside_out(shape):
 def test_unit_and_side_follow_from_size_and_shape(tmp_path, name):
     make, expected = SHAPES[name]
     job, proposal = proposed(tmp_path, make())
-    usual = {"unit": "mm", "flip": False, "repair": False, "region_direction": (0.0, 0.0, 1.0)}
+    usual = {"unit": "mm", "least_body_mm": None, "flip": False, "repair": False, "region_direction": (0.0, 0.0, 1.0)}
     assert {key: getattr(job.part, key) for key in usual} == usual | expected
     mesh, machine = job_mesh(job), job_machine(job)
     assert mesh.diagnosis.problems == ()

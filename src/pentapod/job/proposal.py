@@ -34,8 +34,9 @@ class ProposalOptions:
     another side must show than the top. backs: share of an open surface that may face the top where it is turned over.
     margin: of a box above and below, as a share of the work volume's height. walls_deg, walls: slope from which surface
     is an upright wall, and share of the region from which walls are machined in waterlines beside a raster, whose
-    passes leave those that are parallel to them. above_foot: share of the region below which a box above the foot is no
-    use, and flatter_deg: angles of the region of which the largest is taken then.
+    passes leave those that are parallel to them. debris: largest share of an open surface that small bodies are left
+    out with; these are as small as a cutter may be. above_foot: share of the region below which a box above the foot is
+    no use, and flatter_deg: angles of the region of which the largest is taken then.
     """
 
     usual_mm: tuple[float, float] = (5.0, 2000.0)
@@ -51,6 +52,7 @@ class ProposalOptions:
     backs: float = 0.05
     walls_deg: float = 80.0
     walls: float = 0.001
+    debris: float = 0.02
     above_foot: float = 0.5
     flatter_deg: tuple[float, ...] = (80.0, 70.0, 60.0, 50.0, 40.0, 30.0, 20.0, 10.0)
 
@@ -77,19 +79,12 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
     """Return a job for a mesh file on a machine, which the job calls `name`. Raises MeshError where it is unusable."""
     unit = None if states_unit(part) else _unit(part, machine.work)
     mesh, broken = _loaded(part, unit)
-    faults = mesh.diagnosis
-    if faults.shattered:
-        raise MeshError(
-            "the facets do not join, so there is no surface to machine",
-            file=part,
-            value=f"{faults.bodies:,} bodies of {faults.facets:,} facets",
-            expected="facets that share their edges",
-            remedy="merge close vertices in the program that wrote the mesh, or mend it there",
-        )
     table: dict[str, Any] = {} if unit is None else {"unit": unit}
     reasons: dict[tuple[str, str], str] = {}
-    size = " x ".join(f"{from_si(extent, 'mm'):.4g}" for extent in faults.extents)
-    remarks = [f"the part is {size} mm" + ("" if unit is None else f", if its unit is {unit}: a guess from its size")]
+    mesh, cleared = _without_debris(mesh, table, reasons)
+    size = " x ".join(f"{from_si(extent, 'mm'):.4g}" for extent in mesh.diagnosis.extents)
+    guess = "" if unit is None else f", if its unit is {unit}: a guess from its size"
+    remarks = [f"the part is {size} mm{guess}", *cleared]
     if unit is not None:
         reasons["part", "unit"] = f"a guess: the file does not say it; the part is {size} mm then"
     if broken:
@@ -158,7 +153,31 @@ def _loaded(part: Path, unit: str | None) -> tuple[Mesh, str]:
         mesh, why = None, error.what
     if mesh is not None and (mesh.diagnosis.inverted or not mesh.diagnosis.consistent):
         why = "facets are wound in opposite senses" if not mesh.diagnosis.inverted else "the surface is inside out"
-    return (load_mesh(part, unit, repair=True), why) if mesh is None or why else (mesh, "")
+    mesh = load_mesh(part, unit, repair=True) if mesh is None or why else mesh
+    if mesh.diagnosis.shattered:
+        raise MeshError(
+            "the facets do not join, so there is no surface to machine",
+            file=part,
+            value=f"{mesh.diagnosis.bodies:,} bodies of {mesh.diagnosis.facets:,} facets",
+            expected="facets that share their edges",
+            remedy="merge close vertices in the program that wrote the mesh, or mend it there",
+        )
+    return mesh, why
+
+
+def _without_debris(
+    mesh: Mesh, table: dict[str, Any], reasons: dict[tuple[str, str], str]
+) -> tuple[Mesh, tuple[str, ...]]:
+    """Return an open surface without bodies as small as debris, and what to say; the key for it goes into [part]."""
+    least = _rounded(from_si(OPTIONS.cutter * max(mesh.diagnosis.extents), "mm"))
+    small = mesh.small_bodies(float(to_si(least, "mm")))
+    share = float(mesh.facet_areas[small].sum() / mesh.facet_areas.sum())
+    if mesh.diagnosis.watertight or not 0.0 < share < OPTIONS.debris:
+        return mesh, ()
+    table["least_body_mm"] = least
+    reasons["part", "least_body_mm"] = "smaller pieces are taken for the debris of a scan"
+    clean = mesh.without_small_bodies(float(to_si(least, "mm")))
+    return clean, (f"{clean.diagnosis.notes[-1]}, as the debris of a scan (least_body_mm)",)
 
 
 def _unit(part: Path, work: WorkVolume) -> str:

@@ -53,7 +53,7 @@ class MeshDiagnosis(Value):
     @property
     def remarks(self) -> tuple[str, ...]:
         """Findings that do not disturb machining."""
-        thin = f"{_count(self.slivers, 'sliver')}, a thousand times as long as high"
+        thin = f"{counted(self.slivers, 'sliver')}, a thousand times as long as high"
         return (*self.notes, thin) if self.slivers else self.notes
 
     @property
@@ -61,7 +61,7 @@ class MeshDiagnosis(Value):
         """Faults left after the repairs, each with its remedy; empty for a sound surface."""
         found: list[str] = []
         if not self.consistent:
-            edges = _count(self.inconsistent_edges, "edge")
+            edges = counted(self.inconsistent_edges, "edge")
             found.append(
                 f"facets are wound in opposite senses at {edges}: some normals point the wrong way; "
                 "load with repair = true"
@@ -69,7 +69,7 @@ class MeshDiagnosis(Value):
         if self.inverted:
             found.append("the closed surface is inside out: normals point inwards; load with repair = true")
         if self.non_manifold_edges:
-            found.append(f"{_count(self.non_manifold_edges, 'edge')} with more than two facets: passes end there")
+            found.append(f"{counted(self.non_manifold_edges, 'edge')} with more than two facets: passes end there")
         if self.shattered:
             found.append(
                 f"the facets do not join: {self.bodies:,} bodies of {self.facets:,} facets; "
@@ -79,11 +79,11 @@ class MeshDiagnosis(Value):
 
     def __str__(self) -> str:
         x, y, z = (1e3 * e for e in self.extents)
-        shape = "watertight" if self.watertight else f"open, {_count(self.border_loops, 'border loop')}"
+        shape = "watertight" if self.watertight else f"open, {counted(self.border_loops, 'border loop')}"
         winding = "winding consistent" if self.consistent else "winding inconsistent"
         lines = [
-            f"{self.source}: {_count(self.facets, 'facet')}, {_count(self.vertices, 'vertex')}, "
-            f"{_count(self.bodies, 'body')}",
+            f"{self.source}: {counted(self.facets, 'facet')}, {counted(self.vertices, 'vertex')}, "
+            f"{counted(self.bodies, 'body')}",
             f"  {x:.4g} x {y:.4g} x {z:.4g} mm, area {1e4 * self.area:.4g} cm2; {shape}; {winding}"
             + ("; inside out" if self.inverted else ""),
         ]
@@ -93,7 +93,8 @@ class MeshDiagnosis(Value):
         return "\n".join(lines)
 
 
-def _count(number: int, noun: str) -> str:
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun."""
     plural = {"vertex": "vertices", "body": "bodies"}.get(noun, noun + "s")
     return f"{number:,} {noun if number == 1 else plural}"
 

@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 from pentapod.base.arrays import Bools, Floats, Ints, as_batch, frozen, set_frozen
 from pentapod.base.errors import MeshError
 from pentapod.base.progress import Progress, silent
+from pentapod.base.units import from_si
 from pentapod.base.values import Value
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.mesh import normals
 from pentapod.mesh import repair as repairing
-from pentapod.mesh.diagnosis import MeshDiagnosis, diagnose
+from pentapod.mesh.diagnosis import MeshDiagnosis, counted, diagnose
 from pentapod.mesh.topology import Topology
 
 if TYPE_CHECKING:
@@ -162,6 +163,42 @@ class Mesh(Value):
         own = body_of_facet == number
         exact = None if self.exact_normals is None else self.exact_normals[own]
         return self._derived(self.vertices, self.faces[own], source, exact)
+
+    def small_bodies(self, least: float) -> Bools:
+        """Return the facets (F,) of bodies with an extent, the diagonal of their bounding box, below `least` metres."""
+        count, body = self.topology.bodies
+        low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+        corners, owner = self.vertices[self.faces].reshape(-1, 3), np.repeat(body, 3)
+        np.minimum.at(low, owner, corners)
+        np.maximum.at(high, owner, corners)
+        return np.asarray((np.linalg.norm(high - low, axis=1) < least)[body])
+
+    def without_small_bodies(self, least: float) -> Mesh:
+        """Return the mesh without the bodies whose extent is below `least` metres, such as the debris of a scan.
+
+        What was left out is one of its notes. Raises MeshError where nothing would stay.
+        """
+        small = self.small_bodies(least)
+        if not small.any():
+            return self
+        size, source = f"{from_si(least, 'mm'):.3g} mm", self.diagnosis.source
+        if small.all():
+            raise MeshError(
+                f"no body of the mesh has an extent of {size}",
+                file=source,
+                key="least_body_mm",
+                remedy="a smaller value",
+            )
+        count, share = len(np.unique(self.topology.bodies[1][small])), self.facet_areas[small].sum()
+        note = (
+            f"{counted(count, 'body')} smaller than {size} left out, "
+            f"{100.0 * share / self.facet_areas.sum():.2g} % of the area"
+        )
+        exact = None if self.exact_normals is None else self.exact_normals[~small]
+        return Mesh.of(
+            self.vertices, self.faces[~small], source=source, crease_angle=self.crease_angle,
+            notes=(*self.diagnosis.notes, note), exact_normals=exact,
+        )  # fmt: skip
 
     @classmethod
     def from_trimesh(cls, shape: Trimesh, metres: float, *, repair: bool = False) -> Mesh:

@@ -100,7 +100,10 @@ def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
     Raises MeshError, or JobError where its unit, or lengths of the job, do not suit it.
     """
     part, path = job.part, job.mesh_path
-    keys = {"scale": part.scale, "repair": part.repair, "flip": part.flip, "chordal": job.tolerance.si.chordal}
+    keys = {
+        "scale": part.scale, "repair": part.repair, "flip": part.flip, "least_body": part.si.least_body,
+        "chordal": job.tolerance.si.chordal,
+    }  # fmt: skip
     mesh, known = None, None
     with suppress(OSError):  # reading the file tells why
         state = path.stat()

@@ -29,7 +29,7 @@ Content = Mapping[str, Any]
 
 LATER_KEYS = (
     ("output", "compensation"), ("tolerance", "deflection_mm"), ("placement", "weight_stiffness"),
-    ("placement", "table_turn_deg"),
+    ("placement", "table_turn_deg"), ("part", "least_body_mm"),
 )  # fmt: skip
 """Keys that a job of an earlier version does not have; left out, they are not in its digest."""
 

@@ -48,6 +48,10 @@ class PartKeys:
     flip: Annotated[
         bool, Key("", "turn the surface over: for an open sheet that shows its back to region_direction")
     ] = False
+    least_body: Annotated[
+        float | None,
+        Key("mm", "leave out connected pieces of the mesh with a smaller extent, such as the debris of a scan", gt=0.0),
+    ] = None
     stock: Annotated[
         tuple[float, float, float] | None,
         Key("mm", "size of the raw part along x, y and z of the mesh, for the set-up sheet; nothing is judged by it"),

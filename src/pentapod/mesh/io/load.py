@@ -43,6 +43,7 @@ def load_mesh(
     scale: float = 1.0,
     repair: bool = False,
     flip: bool = False,
+    least_body: float | None = None,
     chordal: float = ReadOptions.chordal,
     crease_angle: float = CREASE_ANGLE,
     progress: Progress = silent,
@@ -51,10 +52,11 @@ def load_mesh(
 
     unit: of the file's numbers, one of `UNITS`; required where the file does not state it, else told if it differs.
     scale: factor after the unit. repair: also wind facets alike (see `Mesh.of`), and drop any number of useless facets;
-    without it more than 1 % of degenerate or duplicated facets is an error. flip: turn all facets over. chordal:
-    largest distance of facets from the surface of a STEP file, metres. crease_angle: radians. Raises MeshError of one
-    line: no such file, a folder, too large, empty, truncated, not a mesh, no facets, zero area, coordinates that are
-    not finite, unit missing (with the size in each unit) or unknown.
+    without it more than 1 % of degenerate or duplicated facets is an error. flip: turn all facets over. least_body:
+    leave out bodies of a smaller extent, metres, such as the debris of a scan. chordal: largest distance of facets from
+    the surface of a STEP file, metres. crease_angle: radians. Raises MeshError of one line: no such file, a folder, too
+    large, empty, truncated, not a mesh, no facets, zero area, coordinates that are not finite, unit missing (with the
+    size in each unit) or unknown.
 
     >>> part = load_mesh("part.stl", "mm")
     >>> print(part.diagnosis)
@@ -64,8 +66,8 @@ def load_mesh(
     path = Path(path)
     if unit is not None and unit not in UNITS:
         raise MeshError("unknown unit", file=path, key="unit", value=unit, remedy=nearest(unit, UNITS))
-    for name, value in (("scale", scale), ("chordal", chordal)):
-        if not (np.isfinite(value) and value > 0.0):
+    for name, value in (("scale", scale), ("chordal", chordal), ("least_body", least_body)):
+        if value is not None and not (np.isfinite(value) and value > 0.0):
             raise MeshError(f"the {name} must be positive", file=path, key=name, value=value)
     progress("mesh", 0.0, "reading")
     read = _read(path, ReadOptions(loose=repair, chordal=chordal / scale))
@@ -86,7 +88,7 @@ def load_mesh(
             expected=f"at most {PLAUSIBLE.most_dropped:.0%}",
             remedy="export the mesh again; where it is complete, repair = true drops these facets",
         )
-    return mesh
+    return mesh if least_body is None else mesh.without_small_bodies(least_body)
 
 
 def _metres(path: Path, read: MeshData, unit: str | None, scale: float) -> tuple[float, tuple[str, ...]]:

@@ -40,14 +40,14 @@ class DriveOptions(Value):
     closed. border: how exactly an open border is known, a share; enters: how far beyond it the ball gets where it is no
     hole. rolls: how far beyond it the ball goes about hollows, within `about_hollows`, that it cuts only so: points at
     a height `hollow` above the part tell. around: longest link around what is in the way, as a multiple of the straight
-    way and twice the clearance. evened: how often the stepover for a scallop is averaged with that of neighbouring facets,
-    whose curvature is noisy. about: how far beyond what the ball touches in a region's box the surface is made, as a
-    multiple of the radius: links may lead there. region_ends: cosines by which a normal is off the limit of a region
-    where that may end; crease: angle between exact and mean normals, radians, from which there are two; halvings: of an
-    edge, to find where the region ends on it. wall: cosine to a region's direction below which a facet is one of a
-    wall; foot: cosine by which the foot of one is within the region. steep: angle to the axis, radians, from which a
-    face has a foot; rising: least rise of a facet over it, as a share of its height. overhangs: what hides a point.
-    places: how they are moved onto the surface.
+    way and twice the clearance. evened: how often the stepover for a scallop is averaged with that of neighbouring
+    facets, whose curvature is noisy. about: how far beyond what the ball touches in a region's box the surface is made,
+    as a multiple of the radius: links may lead there. region_ends: cosines by which a normal is off the limit of a
+    region where that may end; crease: angle between exact and mean normals, radians, from which there are two;
+    halvings: of an edge, to find where the region ends on it. wall: cosine to a region's direction below which a facet
+    is one of a wall; foot: cosine by which the foot of one is within the region. steep: angle to the axis, radians,
+    from which a face has a foot; rising: least rise of a facet over it, as a share of its height. overhangs: what hides
+    a point. places: how they are moved onto the surface.
     """
 
     step: float = 0.25
