@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 
 from pentapod.base.errors import JobError
 from pentapod.base.progress import silent
@@ -18,8 +19,10 @@ from pentapod.cli.main import run as run_cli
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import AdviceOptions, Job, advise, run
 from pentapod.job.advice.options import Tried
+from pentapod.job.advice.parts import Regions
 from pentapod.job.advice.search import Advised, advised
 from pentapod.job.advice.settings import Settings
+from pentapod.job.build.tool import job_tool
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.pipeline.advice_on_errors import can_help
@@ -208,6 +211,60 @@ def test_a_program_that_fails_is_not_split_into_setups(stage, limit, split, tmp_
     assert [each.axis.mode for each in planned[:2]] == ["fixed", "auto"]
     assert {(each.part.region_box_mm, each.placement.setups) for each in planned[:2]} == {(None, 1)}
     assert any(each.placement.setups > 1 for each in planned) == split
+
+
+@pytest.mark.usefixtures("all_fits")
+@pytest.mark.parametrize("otherwise", [frozenset(), frozenset(("spindle touches the part",))])
+@pytest.mark.parametrize("limit", ["spindle", "tool body", "leg 1"])
+def test_what_is_higher_than_where_the_spindle_touches_the_part_is_planned(limit, otherwise, tmp_path):
+    """First where an upright tool has failed as well, else after what keeps all."""
+
+    def plan(job: Job, _) -> Tried:
+        planned.append(job)
+        return Tried("placement")
+
+    planned: list[Job] = []
+    job = Job.load(REFUSED["dome of 75 deg"].write(tmp_path))
+    machine, mesh = job_machine(job), job_mesh(job)
+    toolpath = job_toolpath(job, mesh, machine=machine)[0]
+    heights = 1e3 * toolpath.tips[:, 2]
+    bad = np.flatnonzero(heights < np.quantile(heights, 0.4))
+    short = [Shortfall(f"{limit} touches the part", tuple((k, k) for k in bad.tolist()), 1.0, "mm")]
+    options = AdviceOptions(plans=8, replans=8)
+    advised(job, machine, mesh, toolpath, plan, options, silent, short=short, otherwise=otherwise)
+    cuts = [None if each.part.region_box_mm is None else each.part.region_box_mm[0][2] for each in planned]
+    first, last = (float(np.quantile(heights[bad], share)) for share in (options.nearly_all, 1.0))
+    if limit == "leg 1":
+        assert all(cut is None or abs(cut - last) > 0.1 for cut in cuts)
+    else:
+        at = cuts.index(pytest.approx(first, abs=0.06))
+        assert cuts[at + 1] == pytest.approx(last, abs=0.06)
+        assert all(cut is None for cut in cuts[:at])
+        assert (at <= (limit == "tool body")) == bool(otherwise)  # an upright tool is tried before
+
+
+@pytest.mark.parametrize("direction", ["+x", "-x", "+z", "-z"])
+def test_higher_is_along_the_direction_of_the_region(direction, tmp_path):
+    """Of a block of 50 x 40 x 15 mm from a side, what is seen 5 mm below its top."""
+    side = {"x": [1.0, 0.0, 0.0], "z": [0.0, 0.0, 1.0]}[direction[1]]
+    sign = 1.0 if direction[0] == "+" else -1.0
+    shape = trimesh.creation.box((50.0, 40.0, 15.0))
+    shape.export(tmp_path / "block.stl")
+    job = Job.load(REFUSED["block along normals"].write(tmp_path))
+    part = {"mesh": "block.stl", "region_direction": [sign * v for v in side], "region_angle_deg": 90.0}
+    job = job.with_(part=part)
+    mesh, tool = job_mesh(job), job_tool(job)
+    regions = Regions.of(job, mesh, tool, None, AdviceOptions())
+    deep = {"x": 50.0, "z": 15.0}[direction[1]]
+    across = {"x": (40.0, 15.0), "z": (50.0, 40.0)}[direction[1]]
+    found = regions.above(1e-3 * (0.5 * deep - 5.0))
+    top, walls = across[0] * across[1], 2.0 * (across[0] + across[1])
+    assert found.share == pytest.approx((top + 5.0 * walls) / (top + deep * walls), rel=1e-3)
+    assert found.words == f"without the lowest {deep - 5.0:g} mm"
+    assert regions.above(1e-3 * (0.5 * deep + 0.1)) is None
+    assert regions.above(-1e-3 * (0.5 * deep + 0.1)) is None
+    leaning = job.with_(part={"region_direction": [0.1 + v for v in part["region_direction"]]})
+    assert Regions.of(leaning, mesh, tool, None, AdviceOptions()).above(0.0) is None
 
 
 def test_a_tool_length_that_hardly_fits_is_planned_after_it_was_tried_with_other_axes(tmp_path, monkeypatch):

@@ -25,23 +25,24 @@ class AdviceOptions(Value):
 
     wanted: number of changes to find. plans: whole plans that are tried for them, at most; replans: where a program
     fails its verdict, as long as its plan, or the run went back for another way. points: that stand for the path in
-    estimates. enough: estimated margin from which a change is planned; scarcely: from which one is planned before
-    less of the task is. comfortable: estimated margin beyond which more counts for nothing. failures: plans of one
-    placement that fail before it is the next one's turn. cones_deg: wider tilt cones. angles_deg: smaller angles of
-    the region. setups: numbers of set-ups. lengths: of the tool, as shares of the machine's. first, halvings: first
-    share of the extents, and steps of the bisection, for the largest box. cores: shares of the work volume, for
-    boxes that show what fits where the whole is too wide. most: share of the area from which a region counts as
-    all. elsewhere: how many times more of the area a box must hold elsewhere than about the part's middle; places:
-    of the region that stand for its area. hopeless: estimated margin of the flattest part of a wide region, with a
-    share `flattest` of its area, below which no toolpath of it is made. cuts: places of a toolpath of which smaller
-    regions hold some. top_deg: angle of the region within which a place is flat, where only the top is tried;
-    shallow: first depth of it, as a share of the region's. flat: height, as a share of the largest extent, below
-    which a box keeps it. least: smallest extent of a box, and smallest scale, as shares of what is within reach.
-    spare: share of the extent, or of the scale, that is found and taken; the estimate looks at few points. smaller:
-    factor on the extent of a second, smaller box. doubtful: width of a part, as a multiple of the work volume's,
-    beyond which its unit is doubted. strategies: that are tried where another makes no toolpath. worth_length: what
-    another tool counts beside a region that keeps a share of the area. other_face_deg: turn of a part on a table
-    from which it lies on another face. steep_deg: slope from which walls get waterlines.
+    estimates. enough: estimated margin from which a change is planned; scarcely: from which one is planned before less
+    of the task is. comfortable: estimated margin beyond which more counts for nothing. failures: plans of one placement
+    that fail before it is the next one's turn. cones_deg: wider tilt cones. angles_deg: smaller angles of the region.
+    setups: numbers of set-ups. lengths: of the tool, as shares of the machine's. first, halvings: first share of the
+    extents, and steps of the bisection, for the largest box. cores: shares of the work volume, for boxes that show what
+    fits where the whole is too wide. most: share of the area from which a region counts as all. elsewhere: how many
+    times more of the area a box must hold elsewhere than about the part's middle; places: of the region that stand for
+    its area. hopeless: estimated margin of the flattest part of a wide region, with a share `flattest` of its area,
+    below which no toolpath of it is made. cuts: places of a toolpath of which smaller regions hold some. top_deg: angle
+    of the region within which a place is flat, where only the top is tried; nearly_all: share of the places where the
+    tool or the spindle touch the part that lie below the first height that is tried. shallow: first depth of it, as a
+    share of the region's. flat: height, as a share of the largest extent, below which a box keeps it. least: smallest
+    extent of a box, and smallest scale, as shares of what is within reach. spare: share of the extent, or of the scale,
+    that is found and taken; the estimate looks at few points. smaller: factor on the extent of a second, smaller box.
+    doubtful: width of a part, as a multiple of the work volume's, beyond which its unit is doubted. strategies: that
+    are tried where another makes no toolpath. worth_length: what another tool counts beside a region that keeps a share
+    of the area. other_face_deg: turn of a part on a table from which it lies on another face. steep_deg: slope from
+    which walls get waterlines.
     Where a program fails its verdict: nearer, thinner, slower: factors on the distance between passes, on the cutter's
     diameter (with that distance), and on the feed; surface_points: of the region, at which it is estimated what is
     left; near_share: steps along the toolpath, in radii of the ball; surely: share of what may be left that the
@@ -71,6 +72,7 @@ class AdviceOptions(Value):
     hopeless: float = -1.0
     flattest: float = 0.9
     top_deg: float = 40.0
+    nearly_all: float = 0.99
     shallow: float = 0.2
     flat: float = 0.1
     least: float = 0.1

@@ -125,6 +125,22 @@ class Regions:
         degrees = min(self.options.top_deg, float(from_si(job_region(self.job).within, "deg")))
         return self._in_box(corners, {"region_angle_deg": degrees}, "only what is flat at the top")
 
+    def above(self, height: float) -> Smaller | None:
+        """Return what is higher along the region's direction than `height`, metres; None where that is all, or little.
+
+        None, too, for a direction that is not along an axis of the part: a box has no sides across it.
+        """
+        low, high = self._extents
+        corners = np.stack([low, high]) + np.array([[-1.0], [1.0]]) * self._margin
+        along, upwards = self._along, self._view[self._along] > 0.0
+        bottom = (low if upwards else -high)[along]
+        corners[0 if upwards else 1, along] = height if upwards else -height
+        if abs(self._view[along]) < 1.0 or not bottom < height < (high if upwards else -low)[along]:
+            return None
+        words = f"without the lowest {from_si(height - bottom, 'mm'):.3g} mm"
+        found = self._in_box(corners, {}, words)
+        return found if found is not None and found.share >= self.options.least else None
+
     @property
     def _margin(self) -> float:
         low, high = self._extents

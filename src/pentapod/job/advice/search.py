@@ -8,10 +8,13 @@ from functools import partial
 from itertools import chain, islice
 from types import MappingProxyType
 
+import numpy as np
+
 from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress
 from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.base.values import Value
+from pentapod.geometry.directions import normalised
 from pentapod.job.advice.failed_claims import FailedClaims
 from pentapod.job.advice.options import AdviceOptions, Tried
 from pentapod.job.advice.settings import ABOVE_THE_TIP, TOUCHES, Settings, Tell, joined, merged
@@ -102,7 +105,7 @@ def advised(
     because, last = (lambda words: reasons.update({words: None}), lambda: ended[-1])
     own = partial(
         Trials, because=because, ended=last, placed=toolpath is not None and not short, otherwise=otherwise,
-        meets=bool(short) and all(each.constraint.startswith(ABOVE_THE_TIP) for each in short),
+        meets=_met_below(job, toolpath, short, options),
     )  # fmt: skip
     trials = _trials(job, machine, mesh, toolpath, options, tell, own, partial(Trials, because=because, ended=last))
     if toolpath is not None:
@@ -126,6 +129,20 @@ def advised(
         interrupted = True
         progress("advice", 1.0, "interrupted: what was found is kept")
     return Advised(tuple(found), tuple(tried), interrupted, tuple(reasons))
+
+
+def _met_below(
+    job: Job, toolpath: Toolpath | None, short: Sequence[Shortfall], options: AdviceOptions
+) -> tuple[float, ...]:
+    """Return heights along the region's direction, metres, below which the tool or the spindle touch the part.
+
+    Below the first are nearly all such places, below the last are all. None where a placement has other shortfalls.
+    """
+    if toolpath is None or not short or not all(each.constraint.startswith(ABOVE_THE_TIP) for each in short):
+        return ()
+    rows = np.concatenate([np.arange(a, b + 1) for each in short for a, b in each.waypoints])
+    heights = toolpath.tips[rows] @ normalised(job.part.si.region_direction)
+    return tuple(dict.fromkeys(np.quantile(heights, (options.nearly_all, 1.0)).tolist()))
 
 
 @dataclass

@@ -49,8 +49,9 @@ class Trial:
 class Trials:
     """The trials of one job, from estimates for its settings. placed: whether its own plan had a place for the part.
 
-    otherwise: claims that failed in the other way in which a run planned it. meets: whether nothing but the part that
-    the tool or the spindle touches stood against its own plan.
+    otherwise: claims that failed in the other way in which a run planned it. meets: heights along the region's
+    direction, metres, above which the tool or the spindle hardly touch the part or do not, where nothing else stood
+    against its own plan.
     """
 
     settings: Settings
@@ -58,7 +59,7 @@ class Trials:
     ended: Ended
     placed: bool = False
     otherwise: frozenset[str] = frozenset()
-    meets: bool = False
+    meets: tuple[float, ...] = ()
 
     @property
     def options(self) -> AdviceOptions:
@@ -68,6 +69,8 @@ class Trials:
     def all(self, own: bool) -> Iterator[Trial]:
         """Yield the trials, the best first as far as that is known. own: whether the job as it is counts as one."""
         settings, too_wide = self.settings, self.settings.share_in_reach(self.settings.sketch) < 1.0
+        if self.otherwise:  # it was planned with two kinds of tool axes already
+            yield from self._higher()
         if not too_wide:
             yield from self._keeping_all(own)
         bases = self._bases()
@@ -82,6 +85,8 @@ class Trials:
             yield from self._scarcely(own)
         if not self.meets:
             yield from self._more_setups(bases)
+        elif not self.otherwise:
+            yield from self._higher()
         for base in bases:
             yield from self._smaller(base)
         if touching is not None:
@@ -205,6 +210,13 @@ class Trials:
         for deep in (False, True):
             found += self._boxes(base, lambda share, deep=deep: regions.boxed(share, deep=deep))
         return [self._of_region(base, smaller) for smaller in found]
+
+    def _higher(self) -> Iterator[Trial]:
+        """Yield what is higher than the places where the tool or the spindle touch the part."""
+        for height in self.meets:
+            self.settings.tell("only what is higher")
+            if self._all_regions is not None and (smaller := self._all_regions.above(height)) is not None:
+                yield Trial(smaller.words, smaller.changes, smaller.share, smaller.share)
 
     def _top(self, base: Setting) -> Iterator[Trial]:
         """Yield the flat top of the part: shank or holder may have room there, where they touch the part elsewhere."""
