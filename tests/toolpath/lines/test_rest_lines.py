@@ -56,6 +56,22 @@ def test_passes_a_stepover_apart_leave_no_rest_on_a_plane():
     assert len(rest_lines(sheet(flat), along_x(YS, flat), R, STEP, none)) == 0
 
 
+@pytest.mark.parametrize("step", [3e-3, 1e-3, 0.4e-3, 0.1e-3])
+def test_only_what_may_be_left_is_looked_at_closely_however_near_the_passes_are(step, monkeypatch):
+    """The points that stood for them were farther apart than the passes; all of the surface was refined."""
+    looked = []
+
+    def refined(self, longest):
+        looked.append(len(self.faces))
+        return self
+
+    monkeypatch.setattr(Patch, "refined", refined)
+    ys = np.arange(0.5 * step, 0.03, step)
+    assert len(rest_lines(sheet(flat), along_x(ys, flat), R, step, none)) == 0
+    rim = 2 * 40 * 3  # between the first pass and the border lies half a stepover
+    assert looked[0] <= rim
+
+
 def test_passes_wider_apart_than_the_ball_are_meant_so():
     assert len(rest_lines(sheet(flat), along_x(YS[::3], flat), R, 3.0 * STEP, none)) == 0
 

@@ -28,18 +28,20 @@ class RestOptions:
     """How rest is found.
 
     allowed: height of what may be left, in ridges between passes on a plane. coarse: share of that with which facets
-    are looked at first; edge: of the facets that are looked at again, in stepovers. sample: distance of the points that
-    stand for a pass, in radii. bent: angle between facets, radians, from which directions between their normals are
-    looked at; folded: from which there are none. negligible: share of the area that rest without lines may have in
-    total. rounds: of lines. rings: facets around rest through which its line may run. core: share of the most that is
-    left from which a line begins and ends. shortest: line, in stepovers; shorter ones run through all of their piece.
-    smoothing: rounds in which points of a line are averaged with both neighbours.
+    are looked at first; edge: of the facets that are looked at again, in stepovers. sample, along: largest distance of
+    the points that stand for a pass, in radii, and in halves of the stepover: else what lies between two passes seems
+    farther from both. bent: angle between facets, radians, from which directions between their normals are looked at;
+    folded: from which there are none. negligible: share of the area that rest without lines may have in total. rounds:
+    of lines. rings: facets around rest through which its line may run. core: share of the most that is left from which
+    a line begins and ends. shortest: line, in stepovers; shorter ones run through all of their piece. smoothing: rounds
+    in which points of a line are averaged with both neighbours.
     """
 
     allowed: float = 1.25
     coarse: float = 0.85
     edge: float = 0.15
     sample: float = 0.05
+    along: float = 0.25
     bent: float = float(np.radians(10.0))
     folded: float = float(np.radians(179.0))
     negligible: float = 5e-5
@@ -68,7 +70,7 @@ def rest_lines(
     height = options.allowed * (radius - float(np.sqrt(radius**2 - half**2)))
     if height >= radius:  # passes so far apart are meant to leave the surface between them
         return Passes.joined([])
-    step, whole = options.sample * radius, float(patch.areas.sum())
+    step, whole = min(options.sample * radius, options.along * half), float(patch.areas.sum())
     passes = passes.split(~hides(passes.points))
     centres, parts = _dense(passes.where(passes.lengths >= shortest), step), list[Passes]()
     if not len(centres):
