@@ -37,6 +37,16 @@ def test_bodies_of_a_smaller_extent_are_left_out(tmp_path):
     np.testing.assert_allclose(1e6 * only.facet_areas.sum(), sheet.area, rtol=1e-6)
 
 
+def test_the_repairs_of_the_file_stay_listed():
+    _, whole = scan()
+    faces = np.concatenate([whole.faces, whole.faces[:1], [[0, 0, 1]]])
+    mesh = Mesh.of(1e-3 * whole.vertices, faces)
+    assert mesh.diagnosis.repairs
+    small = mesh.without_small_bodies(3e-3).diagnosis
+    assert (small.repairs, small.degenerate, small.duplicated) == (mesh.diagnosis.repairs, 1, 1)
+    assert small.facets == len(whole.faces) - 4
+
+
 def test_a_mesh_without_small_bodies_stays_as_it_is():
     sheet, _ = scan()
     mesh = Mesh.of(1e-3 * sheet.vertices, sheet.faces)

@@ -169,10 +169,12 @@ def _without_debris(
     mesh: Mesh, table: dict[str, Any], reasons: dict[tuple[str, str], str]
 ) -> tuple[Mesh, tuple[str, ...]]:
     """Return an open surface without bodies as small as debris, and what to say; the key for it goes into [part]."""
+    if mesh.diagnosis.watertight:
+        return mesh, ()
     least = _rounded(from_si(OPTIONS.cutter * max(mesh.diagnosis.extents), "mm"))
     small = mesh.small_bodies(float(to_si(least, "mm")))
     share = float(mesh.facet_areas[small].sum() / mesh.facet_areas.sum())
-    if mesh.diagnosis.watertight or not 0.0 < share < OPTIONS.debris:
+    if not 0.0 < share < OPTIONS.debris:
         return mesh, ()
     table["least_body_mm"] = least
     reasons["part", "least_body_mm"] = "smaller pieces are taken for the debris of a scan"

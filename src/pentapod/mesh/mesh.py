@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -195,10 +195,15 @@ class Mesh(Value):
             f"{100.0 * share / self.facet_areas.sum():.2g} % of the area"
         )
         exact = None if self.exact_normals is None else self.exact_normals[~small]
-        return Mesh.of(
+        mesh = Mesh.of(
             self.vertices, self.faces[~small], source=source, crease_angle=self.crease_angle,
             notes=(*self.diagnosis.notes, note), exact_normals=exact,
         )  # fmt: skip
+        names = ("repairs", "duplicated", "degenerate")
+        done = {name: getattr(self.diagnosis, name) for name in names}
+        found = replace(mesh, diagnosis=replace(mesh.diagnosis, **done))
+        found.__dict__["topology"] = mesh.topology
+        return found
 
     @classmethod
     def from_trimesh(cls, shape: Trimesh, metres: float, *, repair: bool = False) -> Mesh:

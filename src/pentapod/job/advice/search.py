@@ -136,7 +136,7 @@ def _met_below(
 ) -> tuple[float, ...]:
     """Return heights along the region's direction, metres, below which the tool or the spindle touch the part.
 
-    Below the first are nearly all such places, below the last are all. None where a placement has other shortfalls.
+    Below the first are nearly all such places, below the last are all. Empty where a placement has other shortfalls.
     """
     if toolpath is None or not short or not all(each.constraint.startswith(ABOVE_THE_TIP) for each in short):
         return ()
