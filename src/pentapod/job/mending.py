@@ -115,9 +115,19 @@ class Mend(Value):
 
 @dataclass(frozen=True)
 class FailedWay(Value):
-    """Another way in which a run planned its job, and that failed. claims: that do not hold, by name."""
+    """Another way in which a run planned its job, and that failed. claims: that do not hold, by name.
+
+    left: percent of the region that is left, where nothing else stands against its program.
+    """
 
     claims: frozenset[str]
+    left: float | None = None
+
+    @classmethod
+    def of(cls, outcome: Outcome) -> FailedWay:
+        """Return the way whose run ended with an outcome."""
+        failed = failures(outcome.verdict)
+        return cls(frozenset(failed), _value(failed) if set(failed) == {SURFACE_LEFT} else None)
 
 
 def most_left_out(job: Job, options: MendOptions = OPTIONS) -> float:

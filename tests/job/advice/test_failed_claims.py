@@ -19,12 +19,12 @@ def trials(folder, name, claim, value=None, **options):
     return trials_of(Job.load(REFUSED[name].write(folder)), claim, value, **options)
 
 
-def trials_of(job, claim, value=None, also=(), **options):
+def trials_of(job, claim, value=None, also=(), left=None, **options):
     machine, mesh, told = job_machine(job), job_mesh(job), []
     failed = {each.name: Certificate(each.name, False, value, 0.1, "%", Place(), "") for each in (claim, *also)}
     path, _ = job_toolpath(job, mesh, machine=machine)
     given = AdviceOptions(surface_points=4000, **options)
-    return job, list(FailedClaims(job, machine, mesh, path, failed, given, told.append).all()), told
+    return job, list(FailedClaims(job, machine, mesh, path, failed, given, told.append, left).all()), told
 
 
 def test_nearer_passes_are_those_that_leave_as_little_as_was_asked(tmp_path):
@@ -79,6 +79,17 @@ def test_a_little_that_is_left_may_stay(tmp_path, percent):
     assert trial.changes == {"tolerance": {"left_share": share}}
     assert trial.kept == 1.0 - share
     assert trial.words.startswith("at most ")
+
+
+@pytest.mark.parametrize(("claim", "percent"), [(surface_left.CLAIMS[0], 13.0), (slowness.CLAIMS[0], 0.5)])
+def test_a_little_that_another_way_leaves_may_stay(tmp_path, claim, percent):
+    """Where the run does the job in this way again, its program passes then."""
+    given = {"nearer": (), "thinner": 0.99, "left": 0.1415}
+    _, found, _ = trials(tmp_path, "passes too far apart", claim, percent, **given)
+    shares = [
+        each.changes["tolerance"]["left_share"] for each in found if "left_share" in each.changes.get("tolerance", {})
+    ]
+    assert shares == [0.0017]
 
 
 @pytest.mark.parametrize(("percent", "also"), [(1.7, ()), (0.2, slowness.CLAIMS)])

@@ -44,7 +44,10 @@ _FEEDS = frozenset(claim.name for claim in slowness.CLAIMS)
 
 @dataclass(frozen=True, eq=False)
 class FailedClaims:
-    """Trials for the claims of a job that fail, by name. toolpath: the job's, which its program follows."""
+    """Trials for the claims of a job that fail, by name. toolpath: the job's, which its program follows.
+
+    left: percent of the region that is left where a run does the job in another way, if nothing else fails there.
+    """
 
     job: Job
     machine: Machine
@@ -53,6 +56,7 @@ class FailedClaims:
     failed: Mapping[str, Certificate]
     options: AdviceOptions
     tell: Tell
+    left: float | None = None
 
     def all(self) -> Iterator[Trial]:
         """Yield trials, the ones that keep most first. What gouges fails any verdict, so it is left out at once."""
@@ -64,6 +68,8 @@ class FailedClaims:
             yield Trial("a lower feed", {"feed": {"cut_mm_min": feed}}, 1.0, 1.0)
         if _LEFT in self.failed:
             yield from self._leaving_less()
+        else:
+            yield from self._as_left()
 
     def upright(self) -> Iterator[Trial]:
         """Yield the job without what a ball reaches only under an overhang, where the tool touches the part."""
@@ -140,9 +146,10 @@ class FailedClaims:
 
     def _as_left(self) -> Iterator[Trial]:
         """Yield the program as it is, where nothing but a little that is left on the surface stands against it."""
-        left = 1e-2 * (self.failed[_LEFT].value or 0.0)
-        share = _longer(self.options.more * left)
-        if set(self.failed) == {_LEFT} and 0.0 < share <= self.options.little:
+        own = [self.failed[_LEFT].value] if set(self.failed) == {_LEFT} else []
+        left = min((each for each in (*own, self.left) if each is not None), default=0.0)
+        share = _longer(1e-2 * self.options.more * left)
+        if left > 0.0 and share <= self.options.little:
             words = f"at most {100.0 * share:.3g} % of the region stays as it is"
             self.tell(words)
             yield Trial(words, {"tolerance": {"left_share": share}}, 1.0 - share, 1.0 - share)

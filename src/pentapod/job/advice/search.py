@@ -79,13 +79,15 @@ def advised(
     failed: Mapping[str, Certificate] = MappingProxyType({}),
     short: Sequence[Shortfall] = (),
     otherwise: frozenset[str] = frozenset(),
+    left: float | None = None,
     *,
     forbidden: bool = False,
 ) -> Advised:
     """Return changes with which a job that cannot be done is planned, and its verdict passes.
 
     machine, mesh: the job's. toolpath: None where none could be made. failed: claims about its program that fail;
-    short: limits that its placement exceeds; otherwise: claims that fail where it is planned in another way.
+    short: limits that its placement exceeds; otherwise: claims that fail where it is planned in another way;
+    left: percent of the region that one of these ways leaves, where nothing else fails.
     forbidden: whether shank or holder forbid what its ball reaches.
     """
     found: list[Advice] = []
@@ -109,7 +111,7 @@ def advised(
     )  # fmt: skip
     trials = _trials(job, machine, mesh, toolpath, options, tell, own, partial(Trials, because=because, ended=last))
     if toolpath is not None:
-        claims = FailedClaims(job, machine, mesh, toolpath, failed, options, tell)
+        claims = FailedClaims(job, machine, mesh, toolpath, failed, options, tell, left)
         touches = any(each.constraint.startswith(TOUCHES) for each in short)
         # Where it may, a run has planned an upright tool by itself.
         upright = touches and not may_stand(job)

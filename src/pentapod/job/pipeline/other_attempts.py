@@ -125,7 +125,7 @@ def _otherwise(attempt: Attempt, failed: Outcome, job: Job, words: str, before: 
         return outcome
     why = "" if outcome.refusal is None else f": {dataclasses.replace(outcome.refusal, remedy='')}"
     attempt.runner.stages += [
-        Stage(ANOTHER_WAY, 0.0, FailedWay(frozenset(failures(outcome.verdict))), f"{words}. It failed, too{why}"),
+        Stage(ANOTHER_WAY, 0.0, FailedWay.of(outcome), f"{words}. It failed, too{why}"),
         *(stage for stage in runner.stages if isinstance(stage.value, FailedWay)),
     ]
     return attempt.put_back(failed, program)

@@ -83,7 +83,10 @@ def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried],
     forbidden = refusal.stage == FORBIDDEN
     otherwise = outcome.find(FailedWay)
     own = frozenset[str]() if otherwise is None else otherwise.claims
-    found = runner.run("advice", lambda: advised(*search, failed, refusal.diagnosis, own, forbidden=forbidden))
+    ways = [stage.value.left for stage in runner.stages if isinstance(stage.value, FailedWay)]
+    left = min((each for each in ways if each is not None), default=None)
+    about = (failed, refusal.diagnosis, own, left)
+    found = runner.run("advice", lambda: advised(*search, *about, forbidden=forbidden))
     better = refusal.with_advice(found.advice, found.sentence)
     runner.stages = [s if s.value is not refusal else s.with_value(better) for s in runner.stages]
     return attempt.written(outcome.verdict) if failed else attempt.refused(better)
