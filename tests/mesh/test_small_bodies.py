@@ -7,7 +7,9 @@ import pytest
 import trimesh
 
 from pentapod import Mesh, load_mesh
-from pentapod.base.errors import MeshError
+from pentapod.base.errors import JobError, MeshError
+from pentapod.job import Job
+from pentapod.job.build.values import job_mesh
 
 
 def scan():
@@ -51,6 +53,12 @@ def test_a_mesh_without_small_bodies_stays_as_it_is():
     sheet, _ = scan()
     mesh = Mesh.of(1e-3 * sheet.vertices, sheet.faces)
     assert mesh.without_small_bodies(10e-3) is mesh
+
+
+def test_the_error_of_a_job_names_its_key(make_job):
+    job = Job.load(make_job()).with_(part={"least_body_mm": 1e4})
+    with pytest.raises(JobError, match=r"part\.least_body_mm: no body of the mesh has an extent of 10000 mm"):
+        job_mesh(job)
 
 
 @pytest.mark.parametrize("least", [1.0, 0.0, -1e-3, np.nan])

@@ -181,7 +181,7 @@ class Mesh(Value):
         small = self.small_bodies(least)
         if not small.any():
             return self
-        size, source = f"{from_si(least, 'mm'):.3g} mm", self.diagnosis.source
+        size, source = f"{from_si(least, 'mm'):g} mm", self.diagnosis.source
         if small.all():
             raise MeshError(
                 f"no body of the mesh has an extent of {size}",

@@ -1,6 +1,7 @@
 """A job done by an upright tool or with passes nearer together: what it is, who says so, and who takes it up."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from trimesh.convex import convex_hull
 
 import concave_parts
 from pentapod.base.errors import MeshError, ProgramError
+from pentapod.base.progress import silent
 from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.cli.commands.new import dome_stl
 from pentapod.job import Job, judge, run
@@ -27,9 +29,9 @@ from pentapod.job.build.region import rolls
 from pentapod.job.build.specification import job_coverage
 from pentapod.job.build.toolpath import Reports, job_toolpath
 from pentapod.job.build.values import job_mesh
-from pentapod.job.mending import other_way
+from pentapod.job.mending import FailedWay, other_way
 from pentapod.job.outcome import Outcome, Stage
-from pentapod.job.pipeline import attempt
+from pentapod.job.pipeline import attempt, other_attempts
 from pentapod.job.pipeline.other_attempts import ANOTHER_WAY
 from pentapod.job.task import Task
 from pentapod.machine.machine import Machine
@@ -207,6 +209,45 @@ def failing(job, *claims, limits=(), left=2.0):
     )
     certificates = tuple(Certificate(name, False, left, 0.1, "%", Place(), "") for name in claims)
     return Outcome(job, Machine.load("desk"), (Stage("refused", 0.0, refusal),), Verdict(certificates))
+
+
+def test_a_way_that_failed_tells_what_it_left_where_nothing_else_was_wrong(job):
+    assert FailedWay.of(failing(job, SURFACE_LEFT, left=0.2)) == FailedWay(frozenset((SURFACE_LEFT,)), 0.2)
+    assert FailedWay.of(failing(job, SURFACE_LEFT, "lowest feed", left=0.2)).left is None
+    assert FailedWay.of(failing(job, limits=("leg 1 too long",))).left is None
+
+
+@pytest.mark.parametrize(("second", "expected"), [((SURFACE_LEFT,), "second"), ((), "first")])
+def test_what_nearer_passes_leave_is_compared_with_the_last_way_that_left_too_much(job, second, expected, monkeypatch):
+    """The second way may have had no program of which that is known, as where the tool touches the part."""
+    first, last = failing(job, SURFACE_LEFT, left=1.0), failing(job, SURFACE_LEFT, left=0.9)
+    between = failing(job, *second, limits=("tool body touches the part",))
+    outcomes, compared = iter([between, last]), []
+
+    class Planned(SimpleNamespace):
+        def with_task(self, **_):
+            return self
+
+        def planned(self):
+            return next(outcomes)
+
+        def withheld(self):
+            return None
+
+        def put_back(self, failed, _):
+            return failed
+
+    def other(made, _, before):
+        compared.append({id(first): "first", id(between): "second"}[id(before)])
+        return (made, "third attempt") if len(compared) == 1 else None
+
+    for name, stub in (("job_specification", lambda *_, **__: None), ("mended", lambda _, outcome: outcome)):
+        monkeypatch.setattr(other_attempts, name, stub)
+    monkeypatch.setattr(other_attempts, "other_way", other)
+    task = SimpleNamespace(machine=None, specification=SimpleNamespace(sources=SimpleNamespace(machine=None)))
+    attempt = Planned(task=task, mesh=None, runner=SimpleNamespace(progress=silent, stages=[]))
+    other_attempts._otherwise(attempt, first, job, "second attempt")
+    assert compared == ["first", expected]
 
 
 def test_what_fails_decides_on_the_other_way(job):

@@ -114,9 +114,9 @@ def job_mesh(job: Job, progress: Progress = silent) -> Mesh:
         try:
             mesh = load_mesh(path, part.unit, **keys, progress=progress)
         except MeshError as error:
-            if error.key != "unit":
+            if error.key not in ("unit", "least_body_mm"):
                 raise
-            raise job.error("part", "unit", error.what, expected=error.expected, remedy=error.remedy) from error
+            raise job.error("part", error.key, error.what, expected=error.expected, remedy=error.remedy) from error
         if known is not None:
             _READ[known] = mesh
     _check_sizes(job, mesh)

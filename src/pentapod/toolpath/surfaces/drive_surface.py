@@ -130,10 +130,11 @@ class DriveSurface(RolledSurface):
         rolls = (beyond > 0.0) & (beyond <= self.options.rolls * self.radius)
         normals, middles = self.part.facet_normals, self.part.vertices[self.part.faces].mean(axis=1)
         above = (middles + self.options.hollow * self.radius * normals)[region.faces(normals, 0.5 * np.pi) >= 0.0]
-        above = above[_near(patch.vertices[rolls], above, self.radius)]
-        inside, about = patch.vertices[beyond <= 0.0], self.options.about_hollows * self.radius
-        missed = above[~_near(inside, above, self.radius) & _near(inside, above, about)]
-        return (beyond > 0.0) & _near(missed, patch.vertices, about)
+        about = self.options.about_hollows * self.radius
+        above = above[_distance(patch.vertices[rolls], above, self.radius) < np.inf]
+        away = _distance(patch.vertices[beyond <= 0.0], above, about)
+        missed = above[(away > self.radius) & (away < np.inf)]
+        return (beyond > 0.0) & (_distance(missed, patch.vertices, about) < np.inf)
 
     def _normals(self, points: Floats) -> Floats:
         away = self.centres.tree.closest(points)[1]
@@ -185,11 +186,11 @@ class DriveSurface(RolledSurface):
         return points - away, np.sqrt(np.maximum(gap**2 - upright**2, 0.0))
 
 
-def _near(centres: Floats, points: Floats, distance: float) -> Bools:
-    """Return which points (N, 3) are nearer than a distance to one of some centres (M, 3)."""
-    if not len(centres):
-        return np.zeros(len(points), dtype=np.bool_)
-    return np.asarray(KDTree(centres).query(points, distance_upper_bound=distance)[0] < np.inf)
+def _distance(centres: Floats, points: Floats, most: float) -> Floats:
+    """Return how far points (N, 3) are from the nearest of some centres (M, 3); infinite beyond `most` metres."""
+    if not len(centres) or not len(points):
+        return np.full(len(points), np.inf)
+    return np.asarray(KDTree(centres).query(points, distance_upper_bound=most)[0])
 
 
 def _window(part: Mesh, radius: float, view: Floats, options: DriveOptions, region: Region) -> Window | None:
