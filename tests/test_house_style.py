@@ -3,7 +3,10 @@
 import ast
 import re
 import tomllib
+from fnmatch import fnmatch
 from pathlib import Path
+
+import pytest
 
 import pentapod
 
@@ -57,3 +60,11 @@ def test_no_literal_number_of_legs_above_kinematics() -> None:
             ):
                 found.append(f"{path.relative_to(ROOT)}:{node.lineno}")
     assert found == []
+
+
+def test_no_folder_of_tests_is_passed_over(pytestconfig: pytest.Config) -> None:
+    """By itself pytest does not look into folders with names such as `build`."""
+    patterns = pytestconfig.getini("norecursedirs")
+    folders = {file.parent for file in (ROOT / "tests").rglob("test_*.py")}
+    assert len(folders) > 50
+    assert not [folder for folder in folders if any(fnmatch(folder.name, pattern) for pattern in patterns)]
