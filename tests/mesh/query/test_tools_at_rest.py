@@ -6,10 +6,13 @@ from scipy.optimize import minimize
 
 from pentapod.geometry.solids import Solid
 from pentapod.mesh import Mesh
-from pentapod.mesh.query.swept_depth import TouchingBody, touch
+from pentapod.mesh.query.swept_depth import TouchingBody, sweep, touch
 from pentapod.mesh.query.tree import FacetTree
 
 RESOLUTION = 1e-7
+
+SHARES = np.array([(1.0 - a - b, a, b) for a in np.linspace(0.0, 1.0, 61) for b in np.linspace(0.0, 1.0 - a, 61)])
+"""Weights of corners: dense samples of a facet."""
 
 
 def solved(solid, corners):
@@ -99,8 +102,23 @@ def radial(rng, solid):
     return np.column_stack([out * np.cos(turn), out * np.sin(turn), up])
 
 
-@pytest.mark.parametrize("form", [slivers, radial])
-def test_gaps_of_facets_that_have_hardly_a_normal_or_lie_along_the_axis(form):
+def along_the_side(rng, solid):
+    """Facets of walls beside the solid: a line of a cylinder's side is nearest to their plane."""
+    corners = rng.uniform(-2.0, 2.0, size=(3, 3)) * np.array([0.0, solid.largest_radius, 0.02]) + [0.0, 0.0, 0.02]
+    return corners + np.array([solid.largest_radius + solid.rounding + rng.uniform(1e-4, 3e-3), 0.0, 0.0])
+
+
+def across(rng, solid):
+    """Facets whose plane cuts the solid square to the axis, or at a slant, and that lie mostly beside it."""
+    corners = rng.normal(size=(3, 3)) * np.array([6e-3, 6e-3, rng.choice([0.0, 4e-3])])
+    return corners + np.array([*(rng.normal(size=2) * 8e-3), rng.uniform(solid.low, solid.high)])
+
+
+FORMS = [slivers, radial, along_the_side, across]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_gaps_of_facets_that_have_hardly_a_normal_or_lie_along_or_across_the_axis(form):
     rng, compared = np.random.default_rng(11), 0
     for k in range(120):
         solid = list(SOLIDS.values())[k % len(SOLIDS)]
@@ -114,14 +132,26 @@ def test_gaps_of_facets_that_have_hardly_a_normal_or_lie_along_the_axis(form):
     assert compared > 40
 
 
+def test_a_facet_whose_middle_touches_a_flat_end_is_as_deep_in_the_solid_as_dense_samples():
+    """There f has no gradient; by that of the solid's side the facet went no deeper."""
+    solid, tip = Solid("shank", 0.002, 0.015, 0.002, 0.002), np.array([0.003, 0.002, 0.001])
+    corners = 1e-3 * np.array([[5.0, 0.0, -7.0], [0.0, 1.0, 11.0], [4.0, 5.0, 5.0]])
+    points = SHARES @ corners - tip
+    depth = np.minimum(solid.low_radius - np.hypot(points[:, 0], points[:, 1]), points[:, 2] - solid.low).max()
+    assert depth > 1e-3
+    assert -gap(solid, corners, tip=tip)[0] == pytest.approx(depth, rel=0.05)
+    motion, tree = np.array([tip, tip + 1e-6]), FacetTree.of(Mesh.of(corners, [[0, 1, 2]]))
+    swept = sweep(tree, TouchingBody((solid,)), motion, np.array([[0.0, 0.0, 1.0]] * 2))
+    assert float(swept.deepest[0]) == pytest.approx(depth, rel=0.05)
+
+
 def test_depths_are_those_of_dense_samples():
     """Where a facet cuts a cylinder: its depth is that of its deepest point, to 1 %."""
     solid, rng = SOLIDS["cylinder"], np.random.default_rng(7)
-    shares = np.array([(a, b) for a in np.linspace(0.0, 1.0, 61) for b in np.linspace(0.0, 1.0 - a, 61)])
-    weights, inside = np.column_stack([1.0 - shares.sum(axis=1), shares]), 0
+    inside = 0
     for _ in range(80):
         corners = random_facet(rng, solid)
-        points = weights @ corners
+        points = SHARES @ corners
         depth = np.minimum(
             solid.low_radius - np.hypot(points[:, 0], points[:, 1]),
             np.minimum(points[:, 2] - solid.low, solid.high - points[:, 2]),

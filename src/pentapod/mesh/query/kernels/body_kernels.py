@@ -43,22 +43,22 @@ def meridian_distance(solid: Floats, r: float, z: float) -> tuple[float, float, 
             return below - rounding, 0.0, -1.0
         return above - rounding, 0.0, 1.0
     # Outside: the nearest point of the outline: lower disc, slanted side, or upper disc.
-    near_r, near_z = min(r, low_radius), low
+    near_r, near_z, onto_z = min(r, low_radius), low, -1.0
     best = (r - near_r) ** 2 + (z - near_z) ** 2
     other_r = min(r, high_radius)
     other = (r - other_r) ** 2 + (z - high) ** 2
     if other < best:
-        best, near_r, near_z = other, other_r, high
+        best, near_r, near_z, onto_z = other, other_r, high, 1.0
     if length > 0.0:
         along = ((r - low_radius) * side_r + (z - low) * side_z) / (length * length)
         if 0.0 < along < 1.0:
             other_r, other_z = low_radius + along * side_r, low + along * side_z
             other = (r - other_r) ** 2 + (z - other_z) ** 2
             if other < best:
-                best, near_r, near_z = other, other_r, other_z
+                best, near_r, near_z, onto_z = other, other_r, other_z, 0.0
     distance = math.sqrt(best)
     if distance < 1e-15:
-        return distance - rounding, normal_r, normal_z
+        return (distance - rounding, 0.0, onto_z) if onto_z != 0.0 else (distance - rounding, normal_r, normal_z)
     return distance - rounding, (r - near_r) / distance, (z - near_z) / distance
 
 

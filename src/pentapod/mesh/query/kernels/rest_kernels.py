@@ -1,8 +1,9 @@
 """Deepest point of one facet in a solid of revolution at rest; compiled.
 
 f, the signed distance of a point from the solid, is convex. So it is lowest on the facet either where it is lowest on
-the whole plane of the facet, if the facet holds that point, or on a side of the facet beyond which that point lies. The
-first is the point of the plane that is nearest to the solid; along a side two tangents bound f from below.
+the whole plane of the facet, if the facet holds such a point, or on a side of the facet. The first are points of the
+plane that are nearest to the solid: one, the line beside a cylinder, or the disc below a flat end. Where the plane cuts
+the solid and the facet does not, f is lowest on a side, too. Along a side two tangents bound f from below.
 """
 
 from __future__ import annotations
@@ -21,6 +22,9 @@ LEAST_STEP = 0.05
 
 ALIKE = 1e-9
 """Metres by which two supports of a solid differ at least, so that one of them is its nearest point to a plane."""
+
+ALL, CUT = 7, 8
+"""Beyond all sides of a facet; and what is not told by its sides, since the solid may cut it."""
 
 
 @kernel
@@ -107,24 +111,25 @@ def lowest_on_facet(solid: Floats, own: Floats, lowest: Floats, enough: float, e
         return bound
     on_sides = math.inf
     for k in range(3):
-        if beyond & (1 << k):
+        if beyond == CUT or beyond & (1 << k):
             on_sides = min(on_sides, _lowest_on_side(solid, own, (k + 1) % 3, (k + 2) % 3, lowest, enough, eps))
-    return max(bound, on_sides if beyond != 7 else _below_tangent_plane(solid, own, lowest))
+    if beyond == CUT or (bound <= 0.0 and on_sides < ALIKE):
+        return max(bound, _below_tangent_plane(solid, own, lowest))
+    return max(bound, on_sides)
 
 
 @kernel
 def _nearest_on_plane(solid: Floats, own: Floats, lowest: Floats) -> tuple[float, int]:
-    """Return a lower bound of f on the plane of a facet, and beyond which sides of it the plane's lowest point lies.
+    """Return a lower bound of f on the plane of a facet, and beyond which sides of it the plane's lowest points lie.
 
-    That point is lowest's where the facet holds it. Side k is opposite corner k and counts 2**k; 7: it is not known, as
-    where the plane cuts the solid.
+    Such a point is lowest's where the facet holds one. Side k is opposite corner k and counts 2**k.
     """
     ux, uy, uz = own[1, 0] - own[0, 0], own[1, 1] - own[0, 1], own[1, 2] - own[0, 2]
     vx, vy, vz = own[2, 0] - own[0, 0], own[2, 1] - own[0, 1], own[2, 2] - own[0, 2]
     cx, cy, cz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     size = math.sqrt(cx * cx + cy * cy + cz * cz)
     if size == 0.0:
-        return -math.inf, 7
+        return -math.inf, CUT
     nx, ny, nz = cx / size, cy / size, cz / size
     if nx * own[0, 0] + ny * own[0, 1] + nz * (own[0, 2] - 0.5 * (solid[0] + solid[1])) < 0.0:
         nx, ny, nz = -nx, -ny, -nz  # it leads from the solid to the facet
@@ -135,19 +140,49 @@ def _nearest_on_plane(solid: Floats, own: Floats, lowest: Floats) -> tuple[float
     low, high = solid[2] * out + solid[0] * nz, solid[3] * out + solid[1] * nz
     bound = off - max(low, high) - solid[4]
     radius, height = (solid[3], solid[1]) if high > low else (solid[2], solid[0])
-    if bound <= 0.0 or abs(high - low) < ALIKE or radius * out < ALIKE:
-        return bound, 7
-    away = bound + solid[4]
-    x = nx * (radius / out + away) - own[0, 0]
-    y = ny * (radius / out + away) - own[0, 1]
-    z = height + nz * away - own[0, 2]
-    square = size * size
-    a = (cx * (y * vz - z * vy) + cy * (z * vx - x * vz) + cz * (x * vy - y * vx)) / square
-    b = (cx * (uy * z - uz * y) + cy * (uz * x - ux * z) + cz * (ux * y - uy * x)) / square
+    away, flat = bound + solid[4], radius * out < ALIKE < radius
+    kx, ky = (nx / out, ny / out) if out > 0.0 else (0.0, 0.0)
+    if bound <= 0.0:
+        # The line from the highest point of the solid over the plane to its lowest one cuts the plane within the solid.
+        bottom, top = solid[0] * nz - solid[2] * out, solid[1] * nz - solid[3] * out
+        under, foot = (solid[3], solid[1]) if top < bottom else (solid[2], solid[0])
+        share = -bound / (max(low, high) - min(bottom, top) + 2.0 * solid[4])
+        across = (1.0 - share) * radius - share * under
+        off_axis, up = (1.0 - 2.0 * share) * solid[4], (1.0 - share) * height + share * foot
+        a, b = _weights(own, across * kx + off_axis * nx, across * ky + off_axis * ny, up + off_axis * nz)
+        return bound, CUT if a >= 0.0 and b >= 0.0 and a + b <= 1.0 else ALL
+    if flat:  # a point that is nearest to the axis would be as near, and was looked at
+        return bound, ALL
+    a, b = _weights(own, radius * kx + away * nx, radius * ky + away * ny, height + away * nz)
+    if abs(high - low) < ALIKE:  # all of the line to the other end of the side is as near
+        radius, height = (solid[2], solid[0]) if high > low else (solid[3], solid[1])
+        c, d = _weights(own, radius * kx + away * nx, radius * ky + away * ny, height + away * nz)
+        first, last = 0.0, 1.0
+        for here, there in ((a, c), (b, d), (1.0 - a - b, 1.0 - c - d)):
+            if here < 0.0 or there < 0.0:
+                at = here / (here - there) if here != there else math.inf
+                first, last = (max(first, at), last) if here < 0.0 else (first, min(last, at))
+        if not first <= last:
+            return bound, ALL
+        middle = 0.5 * (first + last)
+        a, b = a + middle * (c - a), b + middle * (d - b)
     beyond = (1 if a + b > 1.0 else 0) | (2 if a < 0.0 else 0) | (4 if b < 0.0 else 0)
     if beyond == 0:
         _lower(solid, own, 1.0 - a - b, a, b, lowest)
     return bound, beyond
+
+
+@kernel
+def _weights(own: Floats, x: float, y: float, z: float) -> tuple[float, float]:
+    """Return the weights of the second and third corner of a facet at a point in its plane."""
+    ux, uy, uz = own[1, 0] - own[0, 0], own[1, 1] - own[0, 1], own[1, 2] - own[0, 2]
+    vx, vy, vz = own[2, 0] - own[0, 0], own[2, 1] - own[0, 1], own[2, 2] - own[0, 2]
+    cx, cy, cz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    square = cx * cx + cy * cy + cz * cz
+    x, y, z = x - own[0, 0], y - own[0, 1], z - own[0, 2]
+    a = (cx * (y * vz - z * vy) + cy * (z * vx - x * vz) + cz * (x * vy - y * vx)) / square
+    b = (cx * (uy * z - uz * y) + cy * (uz * x - ux * z) + cz * (ux * y - uy * x)) / square
+    return a, b
 
 
 @kernel
