@@ -40,7 +40,7 @@ class SmoothingOptions:
     slack: float = 1e-5
     near: float = 0.15
     spare: float = 0.02
-    decrease: float = 2e-4
+    decrease: float = 2e-3
     shortfall: float = 1e-2
     saving: float = 0.1
     largest_radius: float = 2.0
