@@ -206,7 +206,7 @@ def leg_path(
             stood = int(keep[: waypoint + 1].sum()) - 1
             stops[stood], dwells[stood] = True, dwells[stood] + seconds
     stops[[0, -1]] = True
-    bounds = np.flatnonzero(stops)
+    bounds, kept = np.flatnonzero(stops), np.flatnonzero(keep)
     shaping = _shaping(u, points, allowed, stops, segment)
     pieces = []
     for a, b in pairwise(bounds.tolist()):
@@ -216,7 +216,7 @@ def leg_path(
         try:
             curve = ToolCurve.of(BSpline(both.t, both.c[:, :6].copy(), both.k), toolpath.tilt_centre)
         except TooSharpError:
-            first, last = np.flatnonzero(keep)[[a, b]]
+            first, last = kept[[a, b]]
             cause = f"the path bends too sharply to measure its length, between waypoints {first} and {last}"
             return Refusal("leg path", cause, remedy="A larger tolerance.path_mm may help")
         ends = np.flatnonzero(np.diff(segment[a:b], append=-1)) + 1
@@ -231,7 +231,7 @@ def leg_path(
                 section_kinds=tuple(toolpath.segments[k].kind for k in which),
                 section_segments=which,
                 waypoint_stations=curve.arc_length(u[a : b + 1] - u[a]),
-                waypoints=np.flatnonzero(keep)[a : b + 1],
+                waypoints=kept[a : b + 1],
             )
         )
     starts = np.concatenate([[0.0], np.cumsum([piece.length for piece in pieces])])
