@@ -14,10 +14,13 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.geometry.directions import angle_between
-from pentapod.numerics.blocks import in_blocks
+from pentapod.numerics.blocks import blocks
 from pentapod.verify.replay.claim import ALLOWANCE, DEG, MM, Claim, Finding, with_allowance
 from pentapod.verify.replay.constant_offset import constant_offset
 from pentapod.verify.replay.replay import Replay
+
+CHORDS = 1 << 15
+"""Chords of which the axes are looked at together."""
 
 
 def tip_deviation(replay: Replay) -> Finding:
@@ -26,8 +29,8 @@ def tip_deviation(replay: Replay) -> Finding:
     The tilt centres are compared, because the tool may tilt about them: their deviation is that of the tip once the
     tool is turned back to the nominal axis.
     """
-    between = at_samples(replay.interval_bounds.deviations)
-    deviation, offset = replay.match.distances + between, None
+    between, offset = at_samples(replay.interval_bounds.deviations), None
+    deviation = replay.match.distances + between
     if deviation.max() > with_allowance(replay.path_tolerance):
         offset = constant_offset(replay)
         if offset is not None and (offset.distances + between).max() < deviation.max():
@@ -65,22 +68,8 @@ def coverage(replay: Replay) -> Finding:
 
 def axis_deviation(replay: Replay) -> Finding:
     """Judge the angle between the tool and the nominal axis of the toolpath."""
-    match, count = replay.match, len(replay.axes)
-    # Events: samples, and waypoints at their times. Between two of them the path turns on one arc.
-    times = np.concatenate([np.arange(count), match.times])
-    turned = np.concatenate([match.turned, match.waypoint_turned])
-    order = np.lexsort((turned, times))
-    times, angles = times[order], np.concatenate([match.angles, match.waypoint_angles])[order]
-    chord = np.minimum(times[:-1].astype(np.intp), count - 2)
-    own, path = in_blocks(angle_between, replay.axes[:-1], replay.axes[1:])[chord], np.diff(turned[order])
-    # Straight lines between vectors are farthest apart at an end. Their distance from the arc of unit vectors is at
-    # most its height: an eighth of the angle squared. At the time of a waypoint the motion's vector is off the arc too.
-    # Along the arc they lag behind by less than a fiftieth of the angle cubed (lemma 14 of docs/proofs.md).
-    rise = 0.25 * own**2 + 0.125 * path**2 + path**3 / 50.0
-    deviations = replay.interval_bounds.axis_deviations[chord]
-    bounds = angle_bound(angles, at_samples(rise), at_samples(deviations))
-    worst = int(np.argmax(bounds))
-    value, sample = float(bounds[worst]), float(times[worst])
+    found = (_farthest_axis(replay, part.start, part.stop) for part in blocks(len(replay.axes) - 1, CHORDS))
+    value, sample = max(found, key=lambda each: each[0])
     tilt, tolerance = replay.specification.tilt, replay.specification.axis_tolerance
     method = (
         "proven bound for all times on the angle to the nominal axis at the matched place (on great circles between "
@@ -90,6 +79,28 @@ def axis_deviation(replay: Replay) -> Finding:
     bound = tilt + tolerance
     allowed = bound + ALLOWANCE * tolerance
     return Finding.at_most(value, bound, DEG, "deg", replay.place(sample), method, allowed)
+
+
+def _farthest_axis(replay: Replay, first: int, last: int) -> tuple[float, float]:
+    """Return a bound on the angle to the path's axis from sample `first` to `last`, and the sample of the largest."""
+    match, chords = replay.match, slice(first, last)
+    # Events: samples, and waypoints at their times. Between two of them the path turns on one arc.
+    samples = slice(first, last + 1)
+    waypoints = slice(int(np.searchsorted(match.times, first)), int(np.searchsorted(match.times, last, "right")))
+    times = np.concatenate([np.arange(first, last + 1), match.times[waypoints]])
+    turned = np.concatenate([match.turned[samples], match.waypoint_turned[waypoints]])
+    order = np.lexsort((turned, times))
+    times, path = times[order], np.diff(turned[order])
+    angles = np.concatenate([match.angles[samples], match.waypoint_angles[waypoints]])[order]
+    chord = np.minimum(times[:-1].astype(np.intp), last - 1) - first
+    own = angle_between(replay.axes[chords], replay.axes[first + 1 : last + 1])[chord]
+    # Straight lines between vectors are farthest apart at an end. Their distance from the arc of unit vectors is at
+    # most its height: an eighth of the angle squared. At the time of a waypoint the motion's vector is off the arc too.
+    # Along the arc they lag behind by less than a fiftieth of the angle cubed (lemma 14 of docs/proofs.md).
+    rise = 0.25 * own**2 + 0.125 * path**2 + path**3 / 50.0
+    bounds = angle_bound(angles, at_samples(rise), at_samples(replay.interval_bounds.axis_deviations[chords][chord]))
+    worst = int(np.argmax(bounds))
+    return float(bounds[worst]), float(times[worst])
 
 
 def start(replay: Replay) -> Finding:
@@ -107,7 +118,9 @@ def end(replay: Replay) -> Finding:
 
 def at_samples(chords: Floats) -> Floats:
     """Return for each sample (M,) the larger value of the chords (M − 1,) that meet there."""
-    return np.maximum(np.append(chords, chords[-1]), np.append(chords[0], chords))
+    larger = np.append(chords, chords[-1])
+    np.maximum(larger[1:], chords, out=larger[1:])
+    return larger
 
 
 def angle_bound(angles: Floats, rise: Floats, deviation: Floats) -> Floats:

@@ -192,12 +192,15 @@ def travels(replay: Replay, starts: Ints, size: int, offsets: Floats) -> Displac
     Infinite where a chord is not proven. The speeds are of the tip and of the line's faster end; a point in between is
     displaced as its share of both, one beyond the ends as a lever.
     """
-    machine, count = replay.machine, len(replay.program.legs) - 1
-    chords = 0.5 * replay.program.period * replay.interval_bounds.speeds[:, [0, 2]]
+    machine, count, longest = replay.machine, len(replay.program.legs) - 1, np.empty((len(starts), 2))
     ends = np.minimum(starts + size, count)
-    edges = np.stack([2 * starts, starts + ends, 2 * ends], axis=1).ravel()
-    halves = np.add.reduceat(np.append(chords, np.zeros((1, 2)), axis=0), edges, axis=0).reshape(-1, 3, 2)[:, :2]
-    of_tip, of_ends = ROUND_UP * halves.max(axis=1).T
+    for part in blocks(len(starts)):
+        first, last = 2 * starts[part.start], 2 * ends[part.stop - 1]
+        chords = 0.5 * replay.program.period * replay.interval_bounds.speeds[first:last, [0, 2]]
+        edges = np.stack([2 * starts, starts + ends, 2 * ends], axis=1)[part].ravel() - first
+        sums = np.add.reduceat(np.append(chords, np.zeros((1, 2)), axis=0), edges, axis=0)
+        longest[part] = sums.reshape(-1, 3, 2)[:, :2].max(axis=1)
+    of_tip, of_ends = ROUND_UP * longest.T
     low, tip, high = min(machine.bars.offsets), machine.tool_length, max(*machine.bars.offsets, machine.tool_length)
     share = np.clip((tip - offsets) / (tip - low), 0.0, 1.0)
     share = np.where(offsets > tip, 1.0, share)

@@ -91,7 +91,8 @@ class FreeSpace:
         Without those where axes have a weight: there the nearest place is not the best one.
         """
         chord = np.minimum(pairing.times.astype(np.intp), len(self._deviations) - 1)
-        at_samples = np.maximum(np.append(self._deviations, 0.0), np.append(0.0, self._deviations))
+        at_samples = np.append(self._deviations, 0.0)
+        np.maximum(at_samples[1:], self._deviations, out=at_samples[1:])
         samples, waypoints = self._weights[0][pairing.intervals] == 0.0, self._weights[1] == 0.0
         samples[[0, -1]] = waypoints[[0, -1]] = True
         of_waypoints = (waypoint_distances + self._deviations[chord])[waypoints]
@@ -134,7 +135,8 @@ class FreeSpace:
         from pentapod.verify.replay import free_space_kernels as kernels  # noqa: PLC0415  compiled: only where used
 
         near = radii - self._deviations
-        at_samples = np.minimum(np.append(near, np.inf), np.append(np.inf, near))
+        at_samples = np.append(near, np.inf)
+        np.minimum(at_samples[1:], near, out=at_samples[1:])
         bounds = (near, at_samples, more, self._turns if by_axis else np.full(len(self._turns), np.inf))
         reached, routed, spare, cells = kernels.walk(
             self._motion, self._path, bounds, self._weights, self._options.cells
@@ -145,7 +147,9 @@ class FreeSpace:
         kernels.trace(cells, routed, intervals, chords)
         sides = np.empty((self._samples + self._waypoints, 3))
         kernels.free_sides(self._motion, self._path, bounds, self._weights, intervals, chords, sides)
-        samples, waypoints = sides[: self._samples, :2] + intervals[:, None], sides[self._samples :] + chords[:, None]
+        samples, waypoints = sides[: self._samples, :2], sides[self._samples :]
+        samples += intervals[:, None]
+        waypoints += chords[:, None]
         # The matching begins and ends with both curves.
         samples[0], samples[-1] = 0.0, self._waypoints - 1.0
         waypoints[0], waypoints[-1] = 0.0, self._samples - 1.0
