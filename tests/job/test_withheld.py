@@ -85,6 +85,10 @@ def test_long_motions_that_the_shank_forbids_count_by_their_length(tmp_path):
     few = GougeReport(motions=3000, gouging=100, depths=(0.0, 5e-4, 0.0), dropped=100, dropped_share=0.19)
     toolpath = job_toolpath(job, job_mesh(job))[0]
     assert "on 19 % of the cuts" in str(foreseen(job, Reports((few,)), toolpath, None))
+    assert "part.region_direction" not in str(foreseen(job, Reports((few,)), toolpath, None))
+    sideways = job.with_(axis={"mode": "fixed", "direction": [1.0, 0.0, 0.0]})
+    told = str(foreseen(sideways, Reports((few,)), toolpath, None))
+    assert "(axis.direction is 90 deg from part.region_direction)" in told
     assert foreseen(job, Reports((replace(few, dropped=1000, dropped_share=0.01),)), toolpath, None) is None
 
 

@@ -9,6 +9,7 @@ from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats
 from pentapod.base.refusal import Refusal
+from pentapod.geometry.directions import angle_between, normalised
 from pentapod.geometry.polyline import spaced
 from pentapod.job.build.region import rolls
 from pentapod.job.build.toolpath import Reports
@@ -84,10 +85,12 @@ class ForesightOptions:
 
     certain: share of the length of cuts that is dropped from which the verdict would find the region missed; missed:
     estimated share of the region that is missed from which it would. As multiples of the share of it that may be left.
+    askew: angle between a fixed axis and the direction that the region faces, radians, from which it is told.
     """
 
     certain: float = 50.0
     missed: float = 2.0
+    askew: float = float(np.radians(30.0))
 
 
 def foreseen(
@@ -111,6 +114,7 @@ def foreseen(
         most, share = job.tolerance.left_share, 100.0 * report.dropped_share
         what = "the tool" if upright else "shank or holder"
         cause = f"with these tool axes {what} would cut into the part on {share:.3g} % of the cuts, which are left out"
+        cause += _askew(job, options)
         allowed = f"{100.0 * most:.2g} % of the region may be left"
         if report.dropped_share > options.certain * most:
             return Refusal(FORBIDDEN, f"{cause}; {allowed}")
@@ -120,6 +124,19 @@ def foreseen(
         if missed > options.missed * most:
             return Refusal(FORBIDDEN, f"{cause}: about {100.0 * missed:.2g} % of the region; {allowed}")
     return None
+
+
+def _askew(job: Job, options: ForesightOptions) -> str:
+    """Return words about a fixed axis that comes from another side than the region faces; empty where it does not."""
+    axis = job.axis.si
+    if axis.mode != "fixed":
+        return ""
+    angle = float(
+        angle_between(*(normalised(np.array(each)) for each in (axis.direction, job.part.si.region_direction)))
+    )
+    if angle < options.askew:
+        return ""
+    return f" (axis.direction is {np.degrees(angle):.0f} deg from part.region_direction)"
 
 
 def _is_ball(cutting: Cutting) -> bool:
