@@ -18,7 +18,8 @@ from pentapod.base.units import from_si
 from pentapod.base.values import Value
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import marked_runs
-from pentapod.job.advice.settings import TOUCHES
+from pentapod.job.advice.options import OPTIONS as ADVICE
+from pentapod.job.advice.settings import TOUCHES, met_below
 from pentapod.job.build.other_ways import (
     STANDS,
     STANDS_ON_END,
@@ -117,17 +118,20 @@ class Mend(Value):
 class FailedWay(Value):
     """Another way in which a run planned its job, and that failed. claims: that do not hold, by name.
 
-    left: percent of the region that is left, where nothing else stands against its program.
+    left: percent of the region that is left, where nothing else stands against its program. meets: heights below which
+    the tool or the spindle touch the part, as of `met_below`.
     """
 
     claims: frozenset[str]
     left: float | None = None
+    meets: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, outcome: Outcome) -> FailedWay:
         """Return the way whose run ended with an outcome."""
-        failed = failures(outcome.verdict)
-        return cls(frozenset(failed), _value(failed) if set(failed) == {SURFACE_LEFT} else None)
+        failed, short = failures(outcome.verdict), () if outcome.refusal is None else outcome.refusal.diagnosis
+        left = _value(failed) if set(failed) == {SURFACE_LEFT} else None
+        return cls(frozenset(failed), left, met_below(outcome.job, outcome.find(Toolpath), short, ADVICE))
 
 
 def most_left_out(job: Job, options: MendOptions = OPTIONS) -> float:

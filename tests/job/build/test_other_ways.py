@@ -217,6 +217,18 @@ def test_a_way_that_failed_tells_what_it_left_where_nothing_else_was_wrong(job):
     assert FailedWay.of(failing(job, limits=("leg 1 too long",))).left is None
 
 
+def test_a_way_that_failed_tells_the_heights_at_which_the_tool_meets_the_part_where_nothing_else_was_wrong(job):
+    path = job_toolpath(job, job_mesh(job))[0]
+
+    def way(*limits):
+        failed = failing(job, limits=limits)
+        return FailedWay.of(replace(failed, stages=(Stage("toolpath", 0.0, (path, "")), *failed.stages)))
+
+    assert way("spindle touches the part").meets[-1] == pytest.approx(path.tips[:10, 2].max())
+    assert way("spindle touches the part", "leg 1 too long").meets == ()
+    assert FailedWay.of(failing(job, SURFACE_LEFT)).meets == ()
+
+
 @pytest.mark.parametrize(("second", "expected"), [((SURFACE_LEFT,), "second"), ((), "first")])
 def test_what_nearer_passes_leave_is_compared_with_the_last_way_that_left_too_much(job, second, expected, monkeypatch):
     """The second way may have had no program of which that is known, as where the tool touches the part."""

@@ -8,16 +8,13 @@ from functools import partial
 from itertools import chain, islice
 from types import MappingProxyType
 
-import numpy as np
-
 from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress
 from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.base.values import Value
-from pentapod.geometry.directions import normalised
 from pentapod.job.advice.failed_claims import FailedClaims
 from pentapod.job.advice.options import AdviceOptions, Tried
-from pentapod.job.advice.settings import ABOVE_THE_TIP, TOUCHES, Settings, Tell, joined, merged
+from pentapod.job.advice.settings import TOUCHES, Settings, Tell, joined, merged, met_below
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.advice.starts import starts
 from pentapod.job.advice.trials import FEWEST, Trial, Trials
@@ -80,6 +77,7 @@ def advised(
     short: Sequence[Shortfall] = (),
     otherwise: frozenset[str] = frozenset(),
     left: float | None = None,
+    meets: tuple[float, ...] = (),
     *,
     forbidden: bool = False,
 ) -> Advised:
@@ -87,7 +85,8 @@ def advised(
 
     machine, mesh: the job's. toolpath: None where none could be made. failed: claims about its program that fail;
     short: limits that its placement exceeds; otherwise: claims that fail where it is planned in another way;
-    left: percent of the region that one of these ways leaves, where nothing else fails.
+    left: percent of the region that one of these ways leaves, where nothing else fails; meets: heights as of
+    `met_below` in one of them.
     forbidden: whether shank or holder forbid what its ball reaches.
     """
     found: list[Advice] = []
@@ -107,7 +106,7 @@ def advised(
     because, last = (lambda words: reasons.update({words: None}), lambda: ended[-1])
     own = partial(
         Trials, because=because, ended=last, placed=toolpath is not None and not short, otherwise=otherwise,
-        meets=_met_below(job, toolpath, short, options),
+        meets=met_below(job, toolpath, short, options) or meets,
     )  # fmt: skip
     trials = _trials(job, machine, mesh, toolpath, options, tell, own, partial(Trials, because=because, ended=last))
     if toolpath is not None:
@@ -131,20 +130,6 @@ def advised(
         interrupted = True
         progress("advice", 1.0, "interrupted: what was found is kept")
     return Advised(tuple(found), tuple(tried), interrupted, tuple(reasons))
-
-
-def _met_below(
-    job: Job, toolpath: Toolpath | None, short: Sequence[Shortfall], options: AdviceOptions
-) -> tuple[float, ...]:
-    """Return heights along the region's direction, metres, below which the tool or the spindle touch the part.
-
-    Below the first are nearly all such places, below the last are all. Empty where a placement has other shortfalls.
-    """
-    if toolpath is None or not short or not all(each.constraint.startswith(ABOVE_THE_TIP) for each in short):
-        return ()
-    rows = np.concatenate([np.arange(a, b + 1) for each in short for a, b in each.waypoints])
-    heights = toolpath.tips[rows] @ normalised(job.part.si.region_direction)
-    return tuple(dict.fromkeys(np.quantile(heights, (options.nearly_all, 1.0)).tolist()))
 
 
 @dataclass

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.distance import pdist
 
 from pentapod.base.refusal import Shortfall
+from pentapod.geometry.directions import normalised
 from pentapod.job.advice.axes import AxisChoice, Changes, axis_choices
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.places import Place, places
@@ -37,6 +38,20 @@ TOUCHES = ("tool body", "the tool touches")
 
 ABOVE_THE_TIP = (*TOUCHES, "spindle touches")
 """Beginnings of the names of limits that depend on the tool's direction on the part, and not on where this stands."""
+
+
+def met_below(
+    job: Job, toolpath: Toolpath | None, short: Sequence[Shortfall], options: AdviceOptions
+) -> tuple[float, ...]:
+    """Return heights along the region's direction, metres, below which the tool or the spindle touch the part.
+
+    Below the first are nearly all such places, below the last are all. Empty where a placement has other shortfalls.
+    """
+    if toolpath is None or not short or not all(each.constraint.startswith(ABOVE_THE_TIP) for each in short):
+        return ()
+    rows = np.concatenate([np.arange(a, b + 1) for each in short for a, b in each.waypoints])
+    heights = toolpath.tips[rows] @ normalised(job.part.si.region_direction)
+    return tuple(dict.fromkeys(np.quantile(heights, (options.nearly_all, 1.0)).tolist()))
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,9 +83,10 @@ def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried],
     forbidden = refusal.stage == FORBIDDEN
     otherwise = outcome.find(FailedWay)
     own = frozenset[str]() if otherwise is None else otherwise.claims
-    ways = [stage.value.left for stage in runner.stages if isinstance(stage.value, FailedWay)]
-    left = min((each for each in ways if each is not None), default=None)
-    about = (failed, refusal.diagnosis, own, left)
+    ways = [stage.value for stage in runner.stages if isinstance(stage.value, FailedWay)]
+    left = min((way.left for way in ways if way.left is not None), default=None)
+    meets = next((way.meets for way in ways if way.meets), ())
+    about = (failed, refusal.diagnosis, own, left, meets)
     found = runner.run("advice", lambda: advised(*search, *about, forbidden=forbidden))
     better = refusal.with_advice(found.advice, found.sentence)
     runner.stages = [s if s.value is not refusal else s.with_value(better) for s in runner.stages]
