@@ -85,12 +85,12 @@ class ForesightOptions:
 
     certain: share of the length of cuts that is dropped from which the verdict would find the region missed; missed:
     estimated share of the region that is missed from which it would. As multiples of the share of it that may be left.
-    askew: angle between a fixed axis and the direction that the region faces, radians, from which it is told.
+    askew_deg: angle between a fixed axis and the direction that the region faces from which it is told.
     """
 
     certain: float = 50.0
     missed: float = 2.0
-    askew: float = float(np.radians(30.0))
+    askew_deg: float = 30.0
 
 
 def foreseen(
@@ -131,12 +131,9 @@ def _askew(job: Job, options: ForesightOptions) -> str:
     axis = job.axis.si
     if axis.mode != "fixed":
         return ""
-    angle = float(
-        angle_between(*(normalised(np.array(each)) for each in (axis.direction, job.part.si.region_direction)))
-    )
-    if angle < options.askew:
-        return ""
-    return f" (axis.direction is {np.degrees(angle):.0f} deg from part.region_direction)"
+    facing = normalised(np.array(job.part.si.region_direction))
+    angle = np.degrees(angle_between(normalised(np.array(axis.direction)), facing))
+    return "" if angle < options.askew_deg else f" (axis.direction is {angle:.0f} deg from part.region_direction)"
 
 
 def _is_ball(cutting: Cutting) -> bool:
