@@ -23,7 +23,8 @@ def clearance(replay: Replay) -> Finding:
     """
     machine, (position, direction) = replay.machine, replay.pose
     chords = 0.5 * replay.program.period * replay.interval_bounds.speeds[:, 2]
-    travelled = np.concatenate([[0.0], np.cumsum(chords)])
+    travelled = np.zeros(len(chords) + 1)
+    np.cumsum(chords, out=travelled[1:])
 
     starts = np.arange(0, len(travelled), STRETCH)
     ends = np.append(starts[1:], len(chords))
@@ -31,14 +32,15 @@ def clearance(replay: Replay) -> Finding:
     at_middle = clearances(machine, position[middles], direction[middles]).min(axis=1)
     travel = np.maximum(travelled[middles] - travelled[starts], travelled[ends] - travelled[middles])
     close = np.flatnonzero(at_middle - 2.0 * travel <= at_middle.min())
-    samples = np.unique((starts[close, None] + np.arange(STRETCH)).clip(max=len(chords)))
-    # The longer of the chords that meet at a sample: half a chord to either side is as far as any moment is from its
-    # nearest sample, and twice that is a chord.
-    around = np.concatenate([chords[:1], np.maximum(chords[1:], chords[:-1]), chords[-1:]])
+    samples = (starts[close, None] + np.arange(STRETCH)).ravel()
+    samples = samples[samples <= len(chords)]
 
     def nearest(own: Ints) -> tuple[float, int, int]:
         """Return the smallest lower bound of the distances around samples `own`, its sample and its pair."""
-        found = clearances(machine, position[own], direction[own]) - around[own, None]
+        # The longer of the chords that meet at a sample: half a chord to either side is as far as any moment is from
+        # its nearest sample, and twice that is a chord.
+        around = np.maximum(chords[np.maximum(own - 1, 0)], chords[np.minimum(own, len(chords) - 1)])
+        found = clearances(machine, position[own], direction[own]) - around[:, None]
         row, column = np.unravel_index(int(np.argmin(found)), found.shape)
         return float(found[row, column]), int(own[row]), int(column)
 
