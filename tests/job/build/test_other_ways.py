@@ -13,6 +13,7 @@ from pentapod.base.progress import silent
 from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.cli.commands.new import dome_stl
 from pentapod.job import Job, judge, run
+from pentapod.job.advice.options import OPTIONS
 from pentapod.job.build.left import FORBIDDEN, foreseen
 from pentapod.job.build.other_ways import (
     as_made,
@@ -33,6 +34,8 @@ from pentapod.job.mending import FailedWay, other_way
 from pentapod.job.outcome import Outcome, Stage
 from pentapod.job.pipeline import attempt, other_attempts
 from pentapod.job.pipeline.other_attempts import ANOTHER_WAY
+from pentapod.job.pipeline.stages import with_advice
+from pentapod.job.stage_runner import StageRunner
 from pentapod.job.task import Task
 from pentapod.machine.machine import Machine
 from pentapod.mesh.io.stl import write_stl
@@ -227,6 +230,23 @@ def test_a_way_that_failed_tells_the_heights_at_which_the_tool_meets_the_part_wh
     assert way("spindle touches the part").meets[-1] == pytest.approx(path.tips[:10, 2].max())
     assert way("spindle touches the part", "leg 1 too long").meets == ()
     assert FailedWay.of(failing(job, SURFACE_LEFT)).meets == ()
+
+
+def test_advice_gets_what_another_way_left_and_at_which_heights_the_tool_met_the_part(job, monkeypatch):
+    def advised(*given, **_):
+        told.append(given[-2:])
+        return SimpleNamespace(advice=(), sentence="nothing")
+
+    told = []
+    monkeypatch.setattr("pentapod.job.pipeline.stages.advised", advised)
+    refused, runner = failing(job, limits=("leg 1 too long",)), StageRunner(silent)
+    no = frozenset(("no",))
+    ways = [FailedWay(no), FailedWay(no, 0.3, (1.0, 2.0)), FailedWay(no, 0.2, (3.0,))]
+    runner.stages = [*refused.stages, *(Stage(ANOTHER_WAY, 0.0, way) for way in ways)]
+    task = SimpleNamespace(job=job, machine=refused.machine, toolpath=None)
+    attempt = SimpleNamespace(task=task, runner=runner, mesh=None, refused=lambda refusal: refusal)
+    with_advice(attempt, replace(refused, stages=tuple(runner.stages)), None, OPTIONS)
+    assert told == [(0.2, (1.0, 2.0))]
 
 
 @pytest.mark.parametrize(("second", "expected"), [((SURFACE_LEFT,), "second"), ((), "first")])

@@ -17,7 +17,7 @@ from pentapod.mesh.query.distance import TOOL_RESOLUTION_M, MeshDistance
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.claims.bodies import clearance
 from pentapod.verify.claims.collisions import body_displacements, claims, line_offsets
-from pentapod.verify.replay.clearance_bounds import Displacement, clearance_bound, displacements
+from pentapod.verify.replay.clearance_bounds import Displacement, clearance_bound, displacements, travels
 
 SHANK = Solid("shank", 0.006, 0.03, 2e-3, 2e-3)
 HOLDER = Solid("holder", 0.03, 0.05, 8e-3, 8e-3)
@@ -147,6 +147,23 @@ def test_displacements_of_bodies_follow_from_points_of_the_line(still):
     np.testing.assert_allclose(body_displacements(moved, (SHANK, cone), 5), [[1, 2, 3, 4, 5, 7, 9 + 0.5 * 0.010]])
     without = Displacement(moved.points[:, :7], moved.turn)
     np.testing.assert_allclose(body_displacements(without, (), 5), [[1, 2, 3, 4, 5, 7]])
+
+
+@pytest.mark.parametrize("size", [1, 4])
+def test_travels_are_the_longer_of_both_ways_from_the_middle_of_each_stretch(size):
+    """Of so many stretches that they are summed in parts, not all side by side, the last one cut short."""
+    rng, count = np.random.default_rng(size), 20_002
+    speeds = rng.uniform(0.0, 0.1, (2 * count, 3))
+    path, samples = cases.toolpath_of(cases.strokes()[:1]), cases.along_x(np.arange(2 * count + 1))
+    replay = cases.measured(path, samples, legs=np.full((count + 1, 5), 0.7), bounds={"speeds": speeds})
+    starts = np.arange(0, count, size)
+    starts = np.append(starts[:-1][rng.uniform(size=len(starts) - 1) < 0.9], starts[-1])
+    tip = replay.machine.tool_length
+    found = travels(replay, starts, size, np.array([tip]))
+    for k in [0, 1, *rng.integers(0, len(starts), 200), len(starts) - 1]:
+        start, end = starts[k], min(starts[k] + size, count)
+        ways = speeds[2 * start : start + end, 0], speeds[start + end : 2 * end, 0]
+        assert found.points[k, 0] == pytest.approx(0.5 * cases.PERIOD * max(way.sum() for way in ways), rel=1e-8)
 
 
 # The search for the smallest gap, on a replay whose gaps are given.

@@ -115,6 +115,42 @@ def test_the_axis_at_a_waypoint_counts_where_it_is_worse(angles, value):
     assert sample_of(found) == (1.5 if angles[1] else 4.0)
 
 
+@pytest.mark.parametrize("at_once", [1, 2, 7, 39])
+@pytest.mark.parametrize("seed", range(4))
+def test_axes_of_a_long_program_are_judged_in_parts_as_all_at_once(at_once, seed, monkeypatch):
+    """No part misses a step between events that the whole has, and waypoints at the time of a sample are among them."""
+    rng, count = np.random.default_rng(seed), 40
+    times = np.sort(np.append(rng.uniform(0.0, 39.0, 40), np.repeat(rng.integers(1, 39, 12), 2)))
+    times[[0, -1]] = 0.0, 39.0
+    events = np.sort(np.concatenate([np.arange(count), times]), kind="stable")
+    turned = np.cumsum(rng.exponential(0.02, len(events)) * (rng.uniform(size=len(events)) < 0.4))
+    own = np.searchsorted(events, np.arange(count))
+    spare = np.ones(len(events), dtype=bool)
+    spare[own] = False
+    lean = np.cumsum(rng.normal(scale=0.02, size=count))
+    axes = np.stack([np.sin(lean), 0.0 * lean, np.cos(lean)], axis=1)
+    off, deviations = rng.uniform(0.0, 0.05, len(events)), rng.uniform(0.0, 0.02, count - 1)
+    tips, upright = np.zeros((len(times), 3)), np.tile([0.0, 0.0, 1.0], (len(times), 1))
+    path = Toolpath((Segment(SegmentKind.CUT, tips, upright, 0.1),))
+    match = {
+        "times": times, "turned": turned[own], "waypoint_turned": turned[spare],
+        "angles": off[own], "waypoint_angles": off[spare],
+    }  # fmt: skip
+    bounds = {"axis_deviations": deviations}
+    asked = {"match": match, "bounds": bounds, "tilt": 0.1, "axis_tolerance": 0.01}
+    given = cases.measured(path, np.zeros((count, 3)), axes, **asked)
+    whole = np.radians(axis_deviation(given).value)
+    monkeypatch.setattr("pentapod.verify.claims.path_deviation.CHORDS_AT_ONCE", at_once)
+    found = np.radians(axis_deviation(given).value)
+    # Each step by itself, from the larger of the angles at both of its ends.
+    chord = np.minimum(events[:-1].astype(int), count - 2)
+    turn = np.abs(np.diff(lean))[chord]
+    rise = 0.25 * turn**2 + 0.125 * np.diff(turned) ** 2 + np.diff(turned) ** 3 / 50.0
+    apart = 2.0 * np.sin(0.5 * np.maximum(off[:-1], off[1:])) + rise
+    least = float((2.0 * np.arcsin(0.5 * apart) + deviations[chord]).max())
+    assert least - 1e-12 <= found <= whole + 1e-12
+
+
 def test_ends_are_compared_with_ends():
     tilt_centres, way = np.zeros((5, 3)), np.zeros((3, 3))
     tilt_centres[0, 0], way[-1, 1] = 1e-5, 3e-5

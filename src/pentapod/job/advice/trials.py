@@ -51,7 +51,7 @@ class Trials:
 
     otherwise: claims that failed in the other way in which a run planned it. meets: heights along the region's
     direction, metres, above which the tool or the spindle hardly touch the part or do not, where nothing else stood
-    against its own plan.
+    against its own plan, or that of another way.
     """
 
     settings: Settings

@@ -19,8 +19,8 @@ from pentapod.verify.replay.claim import ALLOWANCE, DEG, MM, Claim, Finding, wit
 from pentapod.verify.replay.constant_offset import constant_offset
 from pentapod.verify.replay.replay import Replay
 
-CHORDS = 1 << 15
-"""Chords of which the axes are looked at together."""
+CHORDS_AT_ONCE = 1 << 15
+"""Chords whose axes are judged together, so that a long program does not fill the memory."""
 
 
 def tip_deviation(replay: Replay) -> Finding:
@@ -68,8 +68,9 @@ def coverage(replay: Replay) -> Finding:
 
 def axis_deviation(replay: Replay) -> Finding:
     """Judge the angle between the tool and the nominal axis of the toolpath."""
-    found = (_farthest_axis(replay, part.start, part.stop) for part in blocks(len(replay.axes) - 1, CHORDS))
-    value, sample = max(found, key=lambda each: each[0])
+    parts = blocks(len(replay.axes) - 1, CHORDS_AT_ONCE)
+    found = np.array([_farthest_axis(replay, part.start, part.stop) for part in parts])
+    value, sample = found[int(np.argmax(found[:, 0]))].tolist()
     tilt, tolerance = replay.specification.tilt, replay.specification.axis_tolerance
     method = (
         "proven bound for all times on the angle to the nominal axis at the matched place (on great circles between "
@@ -83,17 +84,18 @@ def axis_deviation(replay: Replay) -> Finding:
 
 def _farthest_axis(replay: Replay, first: int, last: int) -> tuple[float, float]:
     """Return a bound on the angle to the path's axis from sample `first` to `last`, and the sample of the largest."""
-    match, chords = replay.match, slice(first, last)
+    match, chords, samples = replay.match, slice(first, last), slice(first, last + 1)
     # Events: samples, and waypoints at their times. Between two of them the path turns on one arc.
-    samples = slice(first, last + 1)
     waypoints = slice(int(np.searchsorted(match.times, first)), int(np.searchsorted(match.times, last, "right")))
     times = np.concatenate([np.arange(first, last + 1), match.times[waypoints]])
     turned = np.concatenate([match.turned[samples], match.waypoint_turned[waypoints]])
     order = np.lexsort((turned, times))
+    if last < len(replay.axes) - 1:  # steps at the time of the last sample belong to the chord behind it
+        order = order[: int(np.searchsorted(times[order], last)) + 1]
     times, path = times[order], np.diff(turned[order])
     angles = np.concatenate([match.angles[samples], match.waypoint_angles[waypoints]])[order]
     chord = np.minimum(times[:-1].astype(np.intp), last - 1) - first
-    own = angle_between(replay.axes[chords], replay.axes[first + 1 : last + 1])[chord]
+    own = angle_between(replay.axes[samples][:-1], replay.axes[samples][1:])[chord]
     # Straight lines between vectors are farthest apart at an end. Their distance from the arc of unit vectors is at
     # most its height: an eighth of the angle squared. At the time of a waypoint the motion's vector is off the arc too.
     # Along the arc they lag behind by less than a fiftieth of the angle cubed (lemma 14 of docs/proofs.md).

@@ -150,7 +150,7 @@ def _nearest_on_plane(solid: Floats, own: Floats, lowest: Floats) -> tuple[float
         across = (1.0 - share) * radius - share * under
         off_axis, up = (1.0 - 2.0 * share) * solid[4], (1.0 - share) * height + share * foot
         a, b = _weights(own, across * kx + off_axis * nx, across * ky + off_axis * ny, up + off_axis * nz)
-        return bound, CUT if a >= 0.0 and b >= 0.0 and a + b <= 1.0 else ALL
+        return bound, ALL if a < 0.0 or b < 0.0 or a + b > 1.0 else CUT  # also where they are no numbers
     if flat:  # a point that is nearest to the axis would be as near, and was looked at
         return bound, ALL
     a, b = _weights(own, radius * kx + away * nx, radius * ky + away * ny, height + away * nz)
