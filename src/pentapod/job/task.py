@@ -166,20 +166,23 @@ class Task:
         return fits(part, self.machine, **self._options())
 
     def _placed(self) -> PlacedPath | Refusal:
-        """Return the placed path. Where leaning makes the tool meet the part, it keeps the toolpath's axes, or one."""
+        """Return the placed path. Where leaning makes the tool meet the part, it keeps the toolpath's axes, or one.
+
+        A path that was planned before, but for some cuts, is not: what meets the part can be left out as well.
+        """
         options = self._options()
         if self.before is not None and (kept := self.before.kept(self.toolpath, self.machine, options)) is not None:
             return kept
         placed = self._planned(options, self.start)
         met = self._meetings(placed)
-        if met and options["tilt"] > 0.0:
+        if met and options["tilt"] > 0.0 and self.start is None:
             common = bool(options["common_axis"])
             placed = self._planned({**options, "common_axis": FIXED} if common else {**options, "tilt": 0.0})
             met = self._meetings(placed)
             if isinstance(placed, PlacedPath):
                 chosen = f"{placed.placement.chosen_by}; {STRAIGHT if common else UPRIGHT}"
                 placed = dataclasses.replace(placed, placement=dataclasses.replace(placed.placement, chosen_by=chosen))
-        return refusal_of(met) if met else placed
+        return refusal_of(placed, met) if met and isinstance(placed, PlacedPath) else placed
 
     def _timed(self, path: LegPath) -> Trajectory | Refusal:
         legs, progress = self.machine.legs, self.runner.progress

@@ -20,8 +20,8 @@ from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.placement.base_reconfiguration import reconfigured
 from pentapod.planning.placement.common_axes import OPTIONS as COMMON_AXES
 from pentapod.planning.placement.common_axes import CommonAxesOptions, Searched, with_common_axis
+from pentapod.planning.placement.own_leans import OwnLeans
 from pentapod.planning.placement.placed_path import PlacedPath, Placement, UnplacedPath
-from pentapod.planning.placement.sampling import best_tilted_margins
 from pentapod.planning.placement.search import SOLVERS, SearchOptions, SolverName, improved_from, search
 from pentapod.planning.placement.secondary_objective import SecondaryObjective, improved, objective_of
 from pentapod.planning.placement.sequential import SequentialSolver
@@ -99,8 +99,13 @@ def plan(
         else:
             problem, found = _improved(problem, start)
         best = found.best
+        everywhere = problem.at_all(samples)
         if best.smallest < NEEDED_MARGIN:
-            return _refusal(toolpath, problem.at_all(samples), best)
+            own = OwnLeans.of(everywhere, best)
+            along = own.along_path(progress)
+            if along is None:
+                return _refusal(toolpath, everywhere, own)
+            return _path(toolpath, everywhere, best, along, found.choice)
         keep = max(KEPT_SHARE * best.smallest, NEEDED_MARGIN)
         if secondary_objective is not None and (constraints.moves or problem.samples.tilt > 0.0):
             progress("placement", 1.0, f"margin {best.smallest:.3f}; now the objective {secondary_objective}")
@@ -111,7 +116,6 @@ def plan(
             progress("tool axis", 0.0, f"smallest margin {best.smallest:.3f}")
             smooth = SOLVERS[solver](problem, False).smooth(best, min(keep, best.smallest), progress)
             leans = leans if smooth is None else AxisSpline.of(problem.samples, problem.cone).leans(smooth)
-        everywhere = problem.at_all(samples)
         return _path(toolpath, everywhere, best, everywhere.samples.spread(leans, rows), found.choice)
 
     rows = samples.shaping(toolpath.starts)
@@ -195,16 +199,13 @@ def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: F
     return PlacedPath(toolpath, placement, branch, tips, axes, values, at.margins.limits, common_axis)
 
 
-def _refusal(toolpath: Toolpath, problem: PlacementProblem, best: Candidate) -> UnplacedPath:
+def _refusal(toolpath: Toolpath, problem: PlacementProblem, own: OwnLeans) -> UnplacedPath:
     """Return why a path does not fit at the best placement found; what fits as it leans there needs no other tilts."""
-    leans = problem.leans(best.coefficients)
-    attempt = _path(toolpath, problem, best, leans, "best attempt")
+    best = own.at
+    # Where each fits by itself, no smooth leans were found.
+    attempt = _path(toolpath, problem, best, own.field if own.fit else own.mixed, "best attempt")
     values = attempt.margins
-    bad = np.flatnonzero(values.min(axis=1) < NEEDED_MARGIN)
-    by_itself, tilted = best_tilted_margins(problem.samples.at(bad), best.margins, best.transform)
-    if (by_itself.min(axis=1) < NEEDED_MARGIN).any():  # else each fits by itself, but not with one smooth field
-        leans[bad] = tilted
-        attempt = _path(toolpath, problem, best, leans, "best attempt")
+    if not own.fit:
         values = values.copy()
-        values[bad] = by_itself
+        values[own.rows] = own.margins
     return refusal(values, attempt, best.margins, NEEDED_MARGIN, fixed=not problem.constraints.moves)

@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 import toolpath_surfaces as surfaces
+from pentapod.base.refusal import Shortfall
 from pentapod.cli.commands.new import dome_stl
 from pentapod.geometry import RigidTransform
 from pentapod.job import Job, run, task
 from pentapod.job.build.placed_check import meetings
+from pentapod.job.mending import Mend
 from pentapod.kinematics.component import COMPONENTS
 from pentapod.planning import PlacedPath, Placement, plan
+from pentapod.planning.placement.placed_path import UnplacedPath
 from pentapod.toolpath import BallCutter, Mesh, RasterOptions, make_toolpath
 from pentapod.verify import Cutting
 from usual_job import job_text
@@ -65,3 +68,34 @@ def test_axes_that_lean_into_the_part_are_planned_again_without_leaning_or_refus
     assert outcome.refusal is not None
     assert "the tool touches the part at waypoints" in str(outcome.refusal)
     assert not (tmp_path / "refused" / "program.csv").exists()
+
+
+def test_what_leans_into_the_part_once_cuts_are_left_out_is_left_out_too(tmp_path, monkeypatch):
+    (tmp_path / "part.stl").write_bytes(dome_stl(cells=12))
+    text = job_text().replace("tilt_deg = 0", "tilt_deg = 15").replace("spacing_mm = 4", "spacing_mm = 1")
+    (tmp_path / "job.toml").write_text(text, encoding="utf-8")
+    asked = []
+
+    def planned(toolpath, machine, **options):
+        placed = plan(toolpath, machine, **{**options, "start": None})
+        asked.append((options["tilt"], options["start"]))
+        if len(asked) == 1:
+            return UnplacedPath("placement", "short", (Shortfall("test", ((100, 101),), 1.0, "mm"),), attempt=placed)
+        if len(asked) == 2:
+            axes, tips = placed.axes.copy(), placed.tips.copy()
+            wrong = leaned(placed, TOO_FAR)
+            axes[200:202], tips[200:202] = wrong.axes[200:202], wrong.tips[200:202]
+            return replace(placed, tips=tips, axes=axes)
+        return placed
+
+    monkeypatch.setattr(task, "plan", planned)
+    outcome = run(Job.load(tmp_path / "job.toml"), tmp_path / "out")
+    assert outcome.passed, str(outcome.refusal)
+    assert [tilt for tilt, _ in asked] == [np.radians(15.0)] * 3  # never without leaning
+    first, second, third = (start for _, start in asked)
+    assert first is None
+    assert second is not None
+    assert third is not second
+    mend = outcome.find(Mend)
+    assert mend.why == ("test", "the tool touches the part")
+    assert len(mend.left_out) == 2

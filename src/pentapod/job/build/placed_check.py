@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pentapod.base.refusal import Refusal, Shortfall
+from pentapod.base.refusal import Shortfall
 from pentapod.geometry.runs import marked_runs
 from pentapod.mesh.query.swept_depth import TouchingBody, meets
 from pentapod.planning import PlacedPath
+from pentapod.planning.placement.placed_path import UnplacedPath
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify import Cutting
 
@@ -31,10 +32,11 @@ def meetings(placed: PlacedPath, cutting: Cutting, slack: float) -> Ranges:
     return tuple((int(a), int(b)) for a, b in marked_runs(met).tolist())
 
 
-def refusal_of(places: Ranges) -> Refusal:
+def refusal_of(placed: PlacedPath, places: Ranges) -> UnplacedPath:
     """Return the refusal of a placed toolpath whose tool meets the part."""
-    return Refusal(
+    return UnplacedPath(
         "placement",
         "with the tool axes that the machine needs, cutter, shank or holder would cut into the part",
         (Shortfall("the tool touches the part", places, 0.0, "mm"),),
+        attempt=placed,
     )

@@ -32,7 +32,9 @@ class SmoothingOptions:
     it saves the share `saving` of the cost; the next step restores the margin. largest_radius, least_radius: of the
     trust region, as shares of the cone. good: ratio of actual to predicted decrease from which it is doubled; shrink:
     its factor after a rejected step. rough, fine, finer: accuracies of the first program and of the last, and the
-    accuracy in between as a share of the relative decrease of the step before. cost: of the penalty on excess.
+    accuracy in between as a share of the relative decrease of the step before. levels: steps in which given leans come
+    up to the margin to keep; far: all waypoints within this distance of it are active then. cost: of the penalty on
+    excess.
     """
 
     steps: int = 40
@@ -50,6 +52,8 @@ class SmoothingOptions:
     rough: float = 1e-3
     fine: float = 1e-6
     finer: float = 1e-2
+    levels: int = 4
+    far: float = 0.3
     cost: CostOptions = field(default_factory=CostOptions)
 
 
@@ -84,14 +88,18 @@ def smoothed(
     keep: float,
     options: SmoothingOptions = OPTIONS,
     progress: Progress = silent,
+    leans: Floats | None = None,
 ) -> Floats | None:
     """Return coefficients (K, 2) of the smoothest spline of the axes that keeps the margin `keep`.
 
-    It starts at the leans of `start` and keeps its placement. None where no such spline was found. progress: gets a
-    report after each program; how many there will be is not known.
+    It starts at the leans of `start`, or at `leans` (N, 3), and keeps its placement. None where no such spline was
+    found. progress: gets a report after each program; how many there will be is not known.
     """
-    run = _Smoothing(problem, start, keep, options, progress)
-    run.begin()
+    run = _Smoothing(problem, start, keep, options, progress, leans)
+    if leans is None:
+        run.begin()
+    elif not run.approached():
+        return None
     for _ in range(options.rounds):
         found = run.smoothest()
         if found is None or not run.add_violated():
@@ -107,7 +115,13 @@ class _Smoothing:
     """
 
     def __init__(
-        self, problem: PlacementProblem, start: Candidate, keep: float, options: SmoothingOptions, progress: Progress
+        self,
+        problem: PlacementProblem,
+        start: Candidate,
+        keep: float,
+        options: SmoothingOptions,
+        progress: Progress,
+        leans: Floats | None = None,
     ) -> None:
         self.problem, self.start, self.keep, self.options = problem, start, keep, options
         self.progress, self.programs = progress, 0
@@ -116,10 +130,13 @@ class _Smoothing:
         self.slopes: dict[tuple[int, ...], Slopes] = {}
         self.kinds: Bools = np.zeros(len(start.margins.limits), dtype=bool)
         self.radius, self.accuracy = options.largest_radius, options.rough
-        self.c = self.spline.fitted(problem.leans(start.coefficients))
+        self.c = self.spline.fitted(problem.leans(start.coefficients) if leans is None else leans)
         self.cost = self.objective.of(self.c)
         everywhere = self.values(self.c, np.arange(len(self.spline.frames)))
-        self.activate(np.union1d(self.spline.nodes, valleys(everywhere)))
+        rows = np.union1d(self.spline.nodes, valleys(everywhere))
+        if leans is not None:
+            rows = np.union1d(rows, np.flatnonzero(everywhere.min(axis=1) < keep + options.far))
+        self.activate(rows)
 
     def activate(self, rows: Ints) -> None:
         """Compute margins at these waypoints from now on."""
@@ -146,8 +163,29 @@ class _Smoothing:
             if cost < self.cost and short < max(self.short, self.options.shortfall):
                 self.c, self.margins, self.short, self.cost = trial, margins, short, cost
 
-    def smoothest(self) -> Floats | None:
-        """Return the smoothest spline that keeps the margin at the active waypoints, or None."""
+    def approached(self) -> bool:
+        """Come up to the margin to keep in steps, and return whether that is done.
+
+        In one step the linear model may have no solution where the margins themselves have one.
+        """
+        keep, short, levels = self.keep, self.short, self.options.levels
+        for k in range(1, levels + 1):
+            self.aim(keep - short * (1.0 - k / levels))
+            if self.smoothest(first=True) is None:
+                return False
+        return True
+
+    def aim(self, keep: float) -> None:
+        """Keep another margin from now on."""
+        self.keep, self.radius = keep, self.options.largest_radius
+        self.short = keep - float(self.margins.min())
+        self.violated = self.margins < keep
+
+    def smoothest(self, *, first: bool = False) -> Floats | None:
+        """Return the smoothest spline that keeps the margin at the active waypoints, or None.
+
+        first: return the first one that does.
+        """
         options = self.options
         model, missed, tried = self.model(), None, list[Floats]()
         for _ in range(options.steps):
@@ -167,7 +205,7 @@ class _Smoothing:
                     converged = self.short <= options.slack and small and length < 0.99 * self.radius
                     self.accuracy = float(np.clip(options.finer * gain / self.cost, options.fine, options.rough))
                     self.c, self.margins, self.short, self.cost = trial, margins, short, cost
-                    if converged:
+                    if converged or (first and self.short <= options.slack):
                         break
                     if gain > options.good * predicted:
                         self.radius = min(2.0 * self.radius, options.largest_radius)

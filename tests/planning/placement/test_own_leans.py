@@ -1,0 +1,101 @@
+"""Leans along the path alone, where no tilt field over the part keeps the limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from pentapod.geometry.rigid import RigidTransform
+from pentapod.planning import PlacedPath, PlacementConstraints, plan
+from pentapod.planning.limits.limit import LimitKind
+from pentapod.planning.placement.own_leans import OwnLeans
+from pentapod.planning.placement.placed_path import UnplacedPath
+from pentapod.planning.problem.problem import PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
+from pentapod.planning.problem.weights import NEEDED_MARGIN
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
+
+TILT = np.radians(20.0)
+
+
+@dataclass(frozen=True)
+class Sway:
+    """The axis has to sway along y, from side to side within `wave` metres: at most `off` from a sine of height 0.2."""
+
+    middle: float
+    wave: float
+    off: float
+    name: str = "sway"
+    unit: str = "1"
+    group: str = "bodies"
+
+    def margin(self, pose):
+        turn = 2.0 * np.pi * (pose.tip[1] - self.middle) / self.wave
+        wanted = 0.2 * (np.sin(turn) if isinstance(turn, np.ndarray) else ca.sin(turn))
+        return 1.0 - (pose.axis[0] - wanted) ** 2 / self.off**2
+
+    def shortfall(self, margin):
+        return self.off * (np.sqrt(1.0 - margin) - 1.0)
+
+
+def zigzag(passes: int = 9, width: float = 0.06) -> Toolpath:
+    """Passes along x on a plane, between which the tool moves on along y."""
+    across = np.linspace(-0.5 * width, 0.5 * width, 40)
+    rows = [
+        np.c_[across[:: 1 - 2 * (k % 2)], np.full(40, y), np.zeros(40)]
+        for k, y in enumerate(np.linspace(-0.5 * width, 0.5 * width, passes))
+    ]
+    places = np.concatenate(rows)
+    return Toolpath((Segment(SegmentKind.CUT, places, np.tile([0.0, 0.0, 1.0], (len(places), 1)), 0.02),), 0.003)
+
+
+@pytest.fixture(scope="module")
+def here(desk):
+    return RigidTransform(np.diag([1.0, -1.0, -1.0]), desk.work.centre)
+
+
+def options(desk, here, wave, off=0.08):
+    sway = Sway(float(here.translation[1]), wave, off)
+    return {"tilt": TILT, "constraints": PlacementConstraints.fixture([here]), "limits": (LimitKind(lambda _: [sway]),)}
+
+
+def test_leans_follow_the_path_where_no_field_over_the_part_fits(desk, here):
+    placed = plan(zigzag(), desk, **options(desk, here, 0.03))
+    assert isinstance(placed, PlacedPath), str(placed)
+    assert placed.margins.min() >= NEEDED_MARGIN
+    wanted = 0.2 * np.sin(2.0 * np.pi * (placed.tips[:, 1] - here.translation[1]) / 0.03)
+    assert np.abs(placed.axes[:, 0] - wanted).max() < 0.08
+    assert np.ptp(wanted) > 0.38
+    turned = np.linalg.norm(np.diff(placed.axes, axis=0), axis=1)
+    assert turned.max() < 0.1  # of the 0.2 from pass to pass: the axis sets out before
+
+
+def test_no_field_fits_there_but_every_waypoint_by_itself(desk, here):
+    samples = ToolpathSamples.of(zigzag(), TILT)
+    asked = options(desk, here, 0.03)
+    problem = PlacementProblem.of(samples, desk, asked["constraints"], limits=asked["limits"])
+    start = problem.candidate(problem.margins[0], here, problem.upright)
+    own = OwnLeans.of(problem, start)
+    assert 50 < len(own.rows) < len(samples.tilt_centres)
+    assert own.fit
+    leans = own.along_path()
+    assert leans is not None
+    assert problem.values_of(start.margins, here, leans).min() >= NEEDED_MARGIN
+    mixed = problem.values_of(start.margins, here, own.mixed).min(axis=1)
+    assert (mixed >= NEEDED_MARGIN).all()
+
+
+def test_what_does_not_fit_by_itself_is_refused_by_name(desk, here):
+    """The sine is higher than the cone lets the axis lean."""
+    asked = {**options(desk, here, 0.03, off=0.02), "tilt": np.radians(8.0)}
+    answer = plan(zigzag(), desk, **asked)
+    assert isinstance(answer, UnplacedPath)
+    assert {each.constraint for each in answer.diagnosis} == {"sway"}
+    samples = ToolpathSamples.of(zigzag(), asked["tilt"])
+    problem = PlacementProblem.of(samples, desk, asked["constraints"], limits=asked["limits"])
+    own = OwnLeans.of(problem, problem.candidate(problem.margins[0], here, problem.upright))
+    assert not own.fit
+    assert own.along_path() is None
