@@ -50,18 +50,36 @@ def test_a_program_need_not_machine_a_part_of_a_facet_that_is_too_steep():
         assert whole.areas.sum() == pytest.approx(smooth, rel=1e-12)
 
 
-def test_steep_facets_amid_others_must_be_machined():
+def rough(spacing):
     """A level scan with noise: facets lean by up to 38 deg, the smooth normals at their corners by less than 28."""
-    line = 1e-3 * np.arange(25.0)
+    line = spacing * np.arange(25.0)
     x, y = (axis.ravel() for axis in np.meshgrid(line, line, indexing="ij"))
-    z = 3e-4 * np.random.default_rng(0).uniform(-1.0, 1.0, len(x))
+    z = 0.3 * spacing * np.random.default_rng(0).uniform(-1.0, 1.0, len(x))
     rows = np.arange(len(x)).reshape(25, 25)
     a, b, c, d = (each.ravel() for each in (rows[:-1, :-1], rows[1:, :-1], rows[1:, 1:], rows[:-1, 1:]))
     faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    part = Mesh.of(np.stack([x, y, z], axis=1), faces, crease_angle=np.pi)
+    return Mesh.of(np.stack([x, y, z], axis=1), faces, crease_angle=np.pi)
+
+
+def covered_of(part):
+    """What a ball of 6 mm must machine up to 30 deg, which facets are steeper, and which have only corners inside."""
     region = Region(angle=np.radians(30.0))
     covered = Coverage.of(part, BallCutter(3e-3), RasterOptions(stepover=2e-3, region=region), path_tolerance=20e-6)
     steep = part.facet_normals[:, 2] < np.cos(np.radians(30.0))
     inside = part.corner_normals[..., 2] >= np.cos(np.radians(30.0)) * np.linalg.norm(part.corner_normals, axis=2)
     assert (steep & inside.all(axis=1)).sum() > 20
-    assert covered.region.areas.sum() >= part.facet_areas[inside.all(axis=1)].sum() * (1.0 - 1e-9)
+    return covered.region, steep, inside.all(axis=1)
+
+
+def test_steep_facets_amid_others_must_be_machined():
+    part = rough(1e-3)
+    region, _, inside = covered_of(part)
+    assert region.areas.sum() >= part.facet_areas[inside].sum() * (1.0 - 1e-9)
+
+
+def test_large_steep_facets_are_no_noise():
+    """Facets of 5 mm are not covered by a ball of 6 mm that rolls beside them."""
+    part = rough(5e-3)
+    region, steep, _ = covered_of(part)
+    assert np.degrees(np.arccos(region.facet_normals[:, 2])).max() <= 30.0 + 1e-6
+    assert 0.5 * part.facet_areas[~steep].sum() < region.areas.sum() <= part.facet_areas[~steep].sum()

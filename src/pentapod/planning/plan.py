@@ -20,7 +20,7 @@ from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.placement.base_reconfiguration import reconfigured
 from pentapod.planning.placement.common_axes import OPTIONS as COMMON_AXES
 from pentapod.planning.placement.common_axes import CommonAxesOptions, Searched, with_common_axis
-from pentapod.planning.placement.own_leans import OwnLeans
+from pentapod.planning.placement.own_leans import OwnLeans, leans_as_planned
 from pentapod.planning.placement.placed_path import PlacedPath, Placement, UnplacedPath
 from pentapod.planning.placement.search import SOLVERS, SearchOptions, SolverName, improved_from, search
 from pentapod.planning.placement.secondary_objective import SecondaryObjective, improved, objective_of
@@ -77,7 +77,8 @@ def plan(
     where none is given. collision_world: obstacles of legs, spindle and tool. weights: of the groups of margins. The
     rail positions of a reconfigurable machine are optimised, too. secondary_objective: up to a tenth of the margin is
     given up for it. limits: kinds of limits besides pentapod's own. Deterministic for a seed. start: plan of nearly the
-    same path on this machine; its placement and leans are improved, and there is no other search.
+    same path on this machine; where it keeps the limits, so does what is found near its leans at its placement; else
+    both are improved, and there is no other search.
 
     Returns a Refusal that names limits, waypoints and shortfalls where the part does not fit. An interruption (Ctrl-C)
     ends the search with the best placement so far, if that fits; else KeyboardInterrupt is raised.
@@ -97,7 +98,8 @@ def plan(
         if start is None:
             problem, found = _searched(problem, tilt, common_axis, seed, solver, progress)
         else:
-            problem, found = _improved(problem, start)
+            problem = _beside(problem, start)
+            found = improved_from(problem, start.component, start.placement.transform)
         best = found.best
         everywhere = problem.at_all(samples)
         if best.smallest < NEEDED_MARGIN:
@@ -118,6 +120,8 @@ def plan(
             leans = leans if smooth is None else AxisSpline.of(problem.samples, problem.cone).leans(smooth)
         return _path(toolpath, everywhere, best, everywhere.samples.spread(leans, rows), found.choice)
 
+    if start is not None and (again := _as_planned(toolpath, _beside(whole, start), start, progress)) is not None:
+        return again
     rows = samples.shaping(toolpath.starts)
     placed = planned(rows)
     # One that does not shape the path may all the same be out of limits.
@@ -180,13 +184,26 @@ def _searched(
     )
 
 
-def _improved(problem: PlacementProblem, start: PlacedPath) -> Searched:
-    """Return the search from one plan of nearly the same path alone: in its branch, with its common direction."""
+def _beside(problem: PlacementProblem, start: PlacedPath) -> PlacementProblem:
+    """Return the problem with the rail positions and the common direction of a plan of nearly the same path."""
     if start.placement.rail_positions is not None:
         problem = problem.on(problem.machine.at(start.placement.rail_positions))
     if start.common_axis is not None:
         problem = problem.along(problem.samples.towards(start.common_axis))
-    return problem, improved_from(problem, start.component, start.placement.transform)
+    return problem
+
+
+def _as_planned(
+    toolpath: Toolpath, problem: PlacementProblem, start: PlacedPath, progress: Progress
+) -> PlacedPath | None:
+    """Return the path placed as a plan of nearly the same path that keeps all limits; None where it does not."""
+    here = problem.constraints.nearest_to(start.placement.transform)
+    margins = next((each for each in problem.margins if each.scene.branch == start.component), None)
+    if start.smallest_margin < NEEDED_MARGIN or margins is None:
+        return None
+    at = problem.candidate(margins, here, problem.upright)
+    leans = leans_as_planned(problem, at, toolpath, start, progress)
+    return None if leans is None else _path(toolpath, problem, at, leans, start.placement.chosen_by)
 
 
 def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: Floats, chosen_by: str) -> PlacedPath:

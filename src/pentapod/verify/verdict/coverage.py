@@ -30,6 +30,10 @@ MOST_FACETS = 1_000_000
 SAME_ANGLE = 1e-9
 """Cosine by which a facet's normal may be beyond the angle of a region, and still counts as within it."""
 
+NOISE = 0.25
+"""Radius of the circle within a steep facet, ball radii, from which it is no noise of the mesh. Where the ball rolls
+only beside a narrower one, it leaves no more than about a thirtieth of its radius."""
+
 RIDGE_FACTOR = 1.25
 """Default of how much higher than on a plane ridges may be, because the surface is curved."""
 
@@ -92,7 +96,7 @@ class Coverage(Value):
             return cls.nothing(f"{type(options).__name__.removesuffix('Options').lower()}: lines that cover no region")
         region = Patch.whole(part).in_box(options.region)
         if rolls_over(tool, options):
-            region = _as_facets_lean(region, options.region)
+            region = _as_facets_lean(region, options.region, NOISE * (tool.scallop_radius or 0.0))
         region = region.where_normals(options.region.faces)
         if isinstance(options, WaterlineOptions):
             upright, flattest = np.asarray(options.upright), options.shallowest
@@ -137,14 +141,17 @@ class Coverage(Value):
         return replace(self, region=Patch(fine.vertices, fine.faces[own], fine.normals[own]))
 
 
-def _as_facets_lean(patch: Patch, region: Region) -> Patch:
+def _as_facets_lean(patch: Patch, region: Region, narrow: float) -> Patch:
     """Return a patch without the facets that are steeper than a region.
 
     A ball rolls over a large flat facet as it is, however far smooth normals lean over it. Steep facets amid others
-    are noise of the mesh: where the smooth normals of all corners are within the region, they stay.
+    are noise of the mesh: where the smooth normals of all corners are within the region, they stay. narrow: radius of
+    the circle within a facet, metres, from which it is none.
     """
     own = region.faces(patch.facet_normals) >= -SAME_ANGLE
-    amid = (region.faces(patch.normals) >= 0.0).all(axis=1)
+    corners = patch.vertices[patch.faces]
+    around = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).sum(axis=1)
+    amid = (region.faces(patch.normals) >= 0.0).all(axis=1) & (2.0 * patch.areas < narrow * around)
     return patch.only(own | amid)
 
 
