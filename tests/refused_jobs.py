@@ -341,7 +341,7 @@ REFUSED: dict[str, Refused] = {
     "gouges only reported": Refused(
         GENERATED["pocket_boss"],
         {
-            "tool": {"type": "flat"},
+            "tool": {"type": "flat", "flute_mm": 4.0, "shank_mm": [[30.0, 9.0, 9.0]]},
             "gouge": {"remedy": ["report"]},
             "axis": {"mode": "fixed", "direction": [0, 0, 1], "tilt_deg": 0.0},
         },

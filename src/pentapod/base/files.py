@@ -10,10 +10,10 @@ import math
 import os
 import secrets
 import zipfile
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from pentapod.base.errors import InputError
 
@@ -76,15 +76,21 @@ def sha256_of(path: Path) -> str:
 
 def packed_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
     """Return the bytes of an .npz; they depend on the arrays alone."""
+    packed = io.BytesIO()
+    pack_arrays(arrays.items(), packed)
+    return packed.getvalue()
+
+
+def pack_arrays(arrays: Iterable[tuple[str, NDArray[Any]]], target: IO[bytes]) -> None:
+    """Write an .npz of named arrays, one after the other, into a file; its bytes depend on the arrays alone."""
     import numpy as np  # noqa: PLC0415 - the command line writes files without it
 
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_STORED) as archive:
-        for name, array in arrays.items():
-            buffer = io.BytesIO()
-            np.lib.format.write_array(buffer, np.asarray(array, order="C"), allow_pickle=False)
-            archive.writestr(zipfile.ZipInfo(f"{name}.npy", ZIP_EPOCH), buffer.getvalue())
-    return packed.getvalue()
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as archive:
+        for name, array in arrays:
+            info, form = zipfile.ZipInfo(f"{name}.npy", ZIP_EPOCH), np.asarray(array, order="C")
+            info.file_size = form.nbytes  # tells whether it needs large numbers; the header gets the true size
+            with archive.open(info, "w") as entry:
+                np.lib.format.write_array(entry, form, allow_pickle=False)
 
 
 MOST_BYTES = 2_000_000_000

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
 from pentapod.base.errors import InputError
-from pentapod.base.files import atomic_write, packed_arrays
+from pentapod.base.files import atomic_write, pack_arrays
 from pentapod.job.ways.names import FILES as WAYS
 
 PROGRAM, VERDICT, REPORT, ARRAYS = "program.csv", "verdict.json", "report.html", "plan.npz"
@@ -51,7 +52,7 @@ def write_json(content: Mapping[str, Any], path: Path) -> None:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def write_arrays(arrays: Mapping[str, NDArray[Any]], path: Path) -> None:
-    """Write an .npz atomically; its bytes depend on the arrays alone."""
-    with atomic_write(path) as temporary:
-        temporary.write_bytes(packed_arrays(arrays))
+def write_arrays(parts: Iterable[Mapping[str, NDArray[Any]]], path: Path) -> None:
+    """Write an .npz of arrays by name, one part after the other, atomically; its bytes depend on the arrays alone."""
+    with atomic_write(path) as temporary, temporary.open("wb") as file:
+        pack_arrays(chain.from_iterable(part.items() for part in parts), file)

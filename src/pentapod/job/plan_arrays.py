@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -105,28 +105,30 @@ def job_file_of(folder: Path) -> Path | None:
     return job if job is not None and job.is_file() else None
 
 
-def arrays_of(outcome: Outcome, folder: Path) -> Arrays:
-    """Return the arrays of an outcome by name, `stage.quantity_unit`, and `JOB_FILE`. folder: of the run."""
-    arrays: Arrays = {JOB_FILE: np.array(_relative(outcome.job.path, folder))}
+def array_parts(outcome: Outcome, folder: Path) -> Iterator[Arrays]:
+    """Yield the arrays of an outcome by name, `stage.quantity_unit`, and `JOB_FILE`. folder: of the run.
+
+    Each part is made when it is asked for: together they are as large as all stages.
+    """
+    yield {JOB_FILE: np.array(_relative(outcome.job.path, folder))}
     if (toolpath := outcome.find(Toolpath)) is not None:
-        arrays |= toolpath_arrays(toolpath)
+        yield toolpath_arrays(toolpath)
     if (piece := outcome.find(Piece)) is not None:
         box = np.array([piece.low, piece.high])
-        arrays |= _in_units({WAYPOINTS: np.array([piece.first, piece.last]), BOX: box})
+        yield _in_units({WAYPOINTS: np.array([piece.first, piece.last]), BOX: box})
     if (placed := outcome.find(PlacedPath)) is not None:
-        arrays |= _placed(placed)
+        yield _placed(placed)
     if (path := outcome.find(LegPath)) is not None:
-        arrays |= _leg_path(path)
+        yield _leg_path(path)
     if (trajectory := outcome.find(Trajectory)) is not None:
-        arrays |= _trajectory(trajectory)
+        yield _trajectory(trajectory)
     if (story := outcome.find(Explanation)) is not None:
-        arrays |= _story(story)
+        yield _story(story)
     if (program := outcome.find(Program)) is not None:
-        arrays |= _in_units({"program.time_s": program.times, "program.legs_mm": program.legs})
+        yield _in_units({"program.time_s": program.times, "program.legs_mm": program.legs})
     if (left := outcome.verdict.left) is not None:
         bounds = np.array([left.allowed, left.far])
-        arrays |= _in_units(dict(zip(LEFT_FORMS, (left.points, left.heights, bounds), strict=True)))
-    return arrays
+        yield _in_units(dict(zip(LEFT_FORMS, (left.points, left.heights, bounds), strict=True)))
 
 
 def left_of(arrays: Mapping[str, NDArray[Any]]) -> MaterialLeft:

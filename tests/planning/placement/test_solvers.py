@@ -53,11 +53,14 @@ def test_steps_end_where_they_hardly_raise_a_margin_that_fits(problem, start, ra
 
 
 @pytest.mark.slow
-def test_raising_the_margin_matches_the_reference(problem, start, raised):
-    """Both end in a local optimum of a problem with kinks; the default may not be the poorer one by much."""
-    reference = IpoptSolver(problem, free=True).raise_margin(start)
+def test_the_reference_raises_a_raised_margin_no_further(problem, start, raised):
+    """It is a local optimum for both solvers. From one start they may reach different ones: see the searches below."""
     assert raised.smallest > start.smallest
-    assert raised.smallest >= 0.97 * reference.smallest
+    reference = IpoptSolver(problem, free=True).raise_margin(raised)
+    assert raised.smallest <= reference.smallest <= 1.001 * raised.smallest
+    # And what the reference reaches from the start is one for the default solver.
+    other = IpoptSolver(problem, free=True).raise_margin(start)
+    assert SequentialSolver(problem, free=True).raise_margin(other).smallest <= 1.001 * other.smallest
     assert problem.steepness(raised.coefficients).max() <= 1.0 + 1e-12
 
 

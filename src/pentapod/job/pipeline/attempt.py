@@ -14,7 +14,7 @@ from pentapod.job.build.limits import pose_limits
 from pentapod.job.build.pieces import job_piece
 from pentapod.job.build.toolpath import Reports, job_toolpath
 from pentapod.job.outcome import Outcome, Stage, refusal_verdict
-from pentapod.job.plan_arrays import arrays_of
+from pentapod.job.plan_arrays import array_parts
 from pentapod.job.plan_before import PlanBefore
 from pentapod.job.run_folder import unstaged
 from pentapod.job.schema.job import Job
@@ -120,7 +120,7 @@ class Attempt:
         outcome = Outcome(task.job.asked or task.job, task.machine, tuple(self.runner.stages), verdict)
         if (placed := outcome.find(PlacedPath)) is not None:
             outcome = dataclasses.replace(outcome, machine=task.on(placed.placement).machine)
-        write_arrays(arrays_of(outcome, unstaged(staging)), staging / ARRAYS)
+        write_arrays(array_parts(outcome, unstaged(staging)), staging / ARRAYS)
         for name, write in self.writers.items():
             self.runner.progress("report", 0.0, name)
             write(outcome, staging / name)
