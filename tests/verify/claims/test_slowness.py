@@ -8,9 +8,12 @@ import replay_cases as cases
 
 from pentapod.base.errors import ArrayError
 from pentapod.geometry.polyline import arc_length
+from pentapod.machine.parts import ToolLimits
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
-from pentapod.verify import verify
+from pentapod.verify import Specification, verify
+from pentapod.verify.claims import slowness, speed
 from pentapod.verify.claims.slowness import unasked_stop
+from pentapod.verify.replay.replay import Replay
 
 FEED, STOP = "lowest feed", "no unasked stop"
 
@@ -225,3 +228,21 @@ def test_a_rest_at_a_corner_of_the_legs_is_short(rocking):
     case, rows = rocking
     for row in rows:
         assert not unasked_stop(cases.replay_of(case, standing(case, row, 1.0))).passed
+
+
+@pytest.mark.parametrize("steps", [1, 2, 7])
+def test_limits_used_are_the_same_in_parts_and_at_once(linear, steps, monkeypatch):
+    tool = ToolLimits(max_tip_acceleration=3.0, max_tip_jerk=50.0, max_axis_velocity=1.0, max_axis_acceleration=9.0)
+    for machine in (linear.machine, replace(linear.machine, tool_limits=tool)):
+        replay = Replay(linear.program, Specification(machine, linear.toolpath, 0.0, 2e-5, 1e-2))
+        whole, speeds = slowness._used(replay), speed.row_speeds(replay, 0.0)
+        assert len(whole) == len(speeds) == len(linear.program.legs) - 1
+        monkeypatch.setattr(slowness, "STEPS_AT_ONCE", steps)
+        monkeypatch.setattr(speed, "STEPS_AT_ONCE", steps)
+        assert slowness._used(replay).tolist() == whole.tolist()
+        assert speed.row_speeds(replay, 0.0).tolist() == speeds.tolist()
+        monkeypatch.undo()
+    position, direction = replay.pose
+    tips = (position + machine.tool_length * direction)[::2]
+    by_hand = np.linalg.norm(np.diff(tips, axis=0), axis=1) / cases.PERIOD
+    np.testing.assert_allclose(speeds, by_hand, rtol=1e-12, atol=1e-15)

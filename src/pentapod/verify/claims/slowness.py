@@ -14,7 +14,7 @@ from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.runs import marked_runs
 from pentapod.numerics.blocks import blocks
 from pentapod.toolpath.toolpath import SegmentKind
-from pentapod.verify.claims.speed import row_speeds
+from pentapod.verify.claims.speed import STEPS_AT_ONCE, row_speeds
 from pentapod.verify.claims.stops_and_dwells import STILL_M, required_stops
 from pentapod.verify.replay.claim import Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
@@ -119,16 +119,28 @@ def _feeds(replay: Replay) -> Floats:
 
 def _used(replay: Replay) -> Floats:
     """Return the largest share (N − 1,) of any limit of legs and tool that is used from row to row."""
+    count = len(replay.program.legs)
+    used = np.empty(count - 1)
+    for part in blocks(count - 1, STEPS_AT_ONCE):
+        # A third difference reaches from the row before a step to the row behind it.
+        first = max(part.start - 1, 0)
+        among = _used_among(replay, slice(first, min(part.stop + 2, count)))
+        used[part] = among[part.start - first : part.stop - first]
+    return used
+
+
+def _used_among(replay: Replay, rows: slice) -> Floats:
+    """Return the same from row to row of some rows, as if there were no others."""
     machine, period = replay.machine, replay.program.period
-    legs, tool = machine.legs, machine.tool_limits
-    used = row_maxima(np.abs(np.diff(replay.program.legs, axis=0)) / (period * legs.max_velocity))
-    _raise(used, _differences(replay.program.legs, 2, period) / legs.max_acceleration)
-    _raise(used, _differences(replay.program.legs, 3, period) / legs.max_jerk)
+    legs, tool, lengths = machine.legs, machine.tool_limits, replay.program.legs[rows]
+    used = row_maxima(np.abs(np.diff(lengths, axis=0)) / (period * legs.max_velocity))
+    _raise(used, _differences(lengths, 2, period) / legs.max_acceleration)
+    _raise(used, _differences(lengths, 3, period) / legs.max_jerk)
     if machine.drive_forces.limited:
-        _raise(used, replay.forces.motion_shares[1:-1])
+        _raise(used, replay.forces.motion_shares[rows][1:-1])
     if tool.given():
-        position, direction = replay.pose
-        tips, axes = (position + machine.tool_length * direction)[::2], direction[::2]
+        position, axes = (pose[::2][rows] for pose in replay.pose)
+        tips = position + machine.tool_length * axes
         for points, order, limit in (
             (tips, 2, tool.max_tip_acceleration),
             (tips, 3, tool.max_tip_jerk),

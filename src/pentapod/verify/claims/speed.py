@@ -6,13 +6,17 @@ from functools import partial
 
 import numpy as np
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Floats, Ints, row_lengths
 from pentapod.geometry.polyline import arc_length
+from pentapod.numerics.blocks import blocks
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.replay.claim import MM, TOLERATED, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
 
 MM_MIN = 60e3  # in a metre per second
+
+STEPS_AT_ONCE = 1 << 15
+"""Steps from row to row that are judged in one block."""
 
 
 def feed(replay: Replay, kind: SegmentKind) -> Finding | Idle:
@@ -51,9 +55,12 @@ def row_speeds(replay: Replay, height: float) -> Floats:
     With linear interpolation the leg speeds jump at each row, and the speed of the tip varies about its mean within
     each period: an effect of the interpolation, not of the feed.
     """
-    position, direction = replay.pose
-    points = (position + (replay.machine.tool_length - height) * direction)[::2]
-    return np.linalg.norm(np.diff(points, axis=0), axis=1) / replay.program.period
+    (position, direction), along = (pose[::2] for pose in replay.pose), replay.machine.tool_length - height
+    made = np.empty(len(position) - 1)
+    for part in blocks(len(made), STEPS_AT_ONCE):
+        rows = slice(part.start, part.stop + 1)
+        made[part] = row_lengths(np.diff(position[rows] + along * direction[rows], axis=0))
+    return made / replay.program.period
 
 
 def speed_limits(replay: Replay) -> tuple[Floats, Ints]:
