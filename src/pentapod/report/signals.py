@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pentapod.base.arrays import Floats, Ints, set_frozen
-from pentapod.geometry.interpolant import Interpolant
+from pentapod.geometry.interpolant import Interpolant, clamped_slopes
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.dynamics.deflection import Yielding, leg_pushes
 from pentapod.machine.machine import Machine
@@ -20,7 +20,7 @@ from pentapod.program.program import Program
 from pentapod.report.figure import DETAIL
 from pentapod.timing.time_law.trajectory import Profile
 from pentapod.toolpath.toolpath import SegmentKind, Toolpath
-from pentapod.verify.replay.row_forces import RowForces
+from pentapod.verify.replay.row_forces import RowForces, motion_of_rows
 
 
 class TimeLaw(Protocol):
@@ -88,7 +88,7 @@ class Signals:
         pentapod's own.
         """
         times = program.times
-        joined = Interpolant.through(program.legs, program.period, program.interpolation)
+        rates, accelerations = motion = _motion(program)
         tips, axes = _poses(program, machine)
         segments = law.segment(np.minimum(times, law.duration))
         speeds = np.linalg.norm(np.gradient(tips, program.period, axis=0), axis=1)
@@ -106,10 +106,10 @@ class Signals:
         profile, poses = law.profile, (tips + machine.tool_length * axes, -axes)
         at = np.clip(np.searchsorted(profile.times, times, side="right") - 1, 0, len(profile.active) - 1)
         return cls(
-            times, program.legs, joined.first, joined.second, tips, axes, speeds, feeds[segments], segments,
+            times, program.legs, rates, accelerations, tips, axes, speeds, feeds[segments], segments,
             kinds[segments], profile.active[at], tuple(profile.constraint_names), values, rows, names,
-            _forces(machine, poses, joined, kinds[segments]),
-            _deflections(program, machine, poses, joined, kinds[segments]),
+            _forces(machine, poses, motion, kinds[segments]),
+            _deflections(program, machine, poses, motion, kinds[segments]),
         )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -121,20 +121,35 @@ class Signals:
         return self.margins.min(axis=1)
 
 
+def _motion(program: Program) -> tuple[Floats, Floats]:
+    """Return rates and accelerations (N, n_legs) of the legs at the rows; of a spline in blocks."""
+    if program.interpolation != "cubic":
+        joined = Interpolant.along(program.legs, None, program.period)
+        return joined.first, joined.second
+    rates, accelerations = np.empty_like(program.legs), np.empty_like(program.legs)
+    for part, *motion in motion_of_rows(program, clamped_slopes(program.legs)):
+        rates[part], accelerations[part] = motion
+    return rates, accelerations
+
+
 def _forces(
-    machine: Machine, poses: tuple[Floats, Floats], joined: Interpolant, cuts: NDArray[np.bool_]
+    machine: Machine, poses: tuple[Floats, Floats], motion: tuple[Floats, Floats], cuts: NDArray[np.bool_]
 ) -> RowForces | None:
     """Return the forces of the drives at the rows, where they have a limit."""
-    return RowForces.at(machine, poses, joined.first, joined.second, cuts) if machine.drive_forces.limited else None
+    return RowForces.at(machine, poses, *motion, cuts) if machine.drive_forces.limited else None
 
 
 def _deflections(
-    program: Program, machine: Machine, poses: tuple[Floats, Floats], joined: Interpolant, cuts: NDArray[np.bool_]
+    program: Program,
+    machine: Machine,
+    poses: tuple[Floats, Floats],
+    motion: tuple[Floats, Floats],
+    cuts: NDArray[np.bool_],
 ) -> Floats | None:
     """Return how far the tip deflects at the rows (N, 2): see `Signals`."""
     if not machine.yielding_known:
         return None
-    push = leg_pushes(machine, *poses, joined.first, joined.second, weight=not program.provenance.compensation)
+    push = leg_pushes(machine, *poses, *motion, weight=not program.provenance.compensation)
     found = Yielding.of(machine, *poses, push)
     by_masses = np.linalg.norm(found.shift, axis=1)
     return np.column_stack([by_masses + machine.cutting_force * found.softest * cuts, by_masses])

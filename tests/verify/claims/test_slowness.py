@@ -231,16 +231,20 @@ def test_a_rest_at_a_corner_of_the_legs_is_short(rocking):
 
 
 @pytest.mark.parametrize("steps", [1, 2, 7])
-def test_limits_used_are_the_same_in_parts_and_at_once(linear, steps, monkeypatch):
+def test_motion_from_row_to_row_is_judged_alike_in_parts_and_at_once(linear, steps, monkeypatch):
     tool = ToolLimits(max_tip_acceleration=3.0, max_tip_jerk=50.0, max_axis_velocity=1.0, max_axis_acceleration=9.0)
     for machine in (linear.machine, replace(linear.machine, tool_limits=tool)):
         replay = Replay(linear.program, Specification(machine, linear.toolpath, 0.0, 2e-5, 1e-2))
-        whole, speeds = slowness._used(replay), speed.row_speeds(replay, 0.0)
+        whole, speeds, stop = slowness._used(replay), speed.row_speeds(replay, 0.0), unasked_stop(replay)
+        limits, governing = speed.speed_limits(replay)
+        assert len(np.unique(governing)) > 3
         assert len(whole) == len(speeds) == len(linear.program.legs) - 1
         monkeypatch.setattr(slowness, "STEPS_AT_ONCE", steps)
         monkeypatch.setattr(speed, "STEPS_AT_ONCE", steps)
         assert slowness._used(replay).tolist() == whole.tolist()
         assert speed.row_speeds(replay, 0.0).tolist() == speeds.tolist()
+        assert [each.tolist() for each in speed.speed_limits(replay)] == [limits.tolist(), governing.tolist()]
+        assert unasked_stop(replay) == stop
         monkeypatch.undo()
     position, direction = replay.pose
     tips = (position + machine.tool_length * direction)[::2]

@@ -84,8 +84,11 @@ def unasked_stop(replay: Replay) -> Finding:
     feeds = [min(segment.feed, replay.machine.rapid_velocity) for segment in replay.toolpath.segments]
     # The row nearest to a stop is within half a period of it: by then a leg has gained at most this.
     rest = np.minimum(legs.max_jerk * period**2, OPTIONS.creep * min(feeds))
-    steps = np.abs(np.diff(replay.program.legs, axis=0))
-    runs = marked_runs(np.asarray((steps <= np.maximum(rest * period, STILL_M)).all(axis=1)))
+    rows, still = replay.program.legs, np.empty(len(replay.program.legs) - 1, dtype=np.bool_)
+    for part in blocks(len(still), STEPS_AT_ONCE):
+        steps = np.abs(np.diff(rows[part.start : part.stop + 1], axis=0))
+        still[part] = (steps <= np.maximum(rest * period, STILL_M)).all(axis=1)
+    runs = marked_runs(still)
     corner = min(OPTIONS.corner, replay.specification.stop_angle or OPTIONS.corner)
     reasons, dwell = _reasons(replay, runs, corner)
     seconds = (runs[:, 1] - runs[:, 0]) * period

@@ -73,12 +73,16 @@ def speed_limits(replay: Replay) -> tuple[Floats, Ints]:
     rapid = replay.machine.rapid_velocity
     limits = np.array([rapid if s.kind == SegmentKind.RAPID else min(s.feed, rapid) for s in segments])
     bounds = arc_length(replay.toolpath.tilt_centres)[replay.toolpath.starts]
-    low = np.searchsorted(bounds[1:], arcs[:-1] - replay.match_radius, side="left")
-    high = np.searchsorted(bounds[1:-1], arcs[1:] + replay.match_radius, side="right")
-    governing = low.copy()
-    for step in range(int((high - low).max()) + 1):
-        other = np.minimum(low + step, high)
-        governing = np.where(limits[other] > limits[governing], other, governing)
+    governing = np.empty(len(arcs) - 1, dtype=np.intp)
+    for part in blocks(len(governing), STEPS_AT_ONCE):
+        low = np.searchsorted(bounds[1:], arcs[part] - replay.match_radius, side="left")
+        ends = arcs[part.start + 1 : part.stop + 1]
+        high = np.searchsorted(bounds[1:-1], ends + replay.match_radius, side="right")
+        fastest = low.copy()
+        for step in range(int((high - low).max()) + 1):
+            other = np.minimum(low + step, high)
+            fastest = np.where(limits[other] > limits[fastest], other, fastest)
+        governing[part] = fastest
     return limits[governing], governing
 
 
