@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 import pytest
 
+from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning import PlacedPath, PlacementConstraints, plan
 from pentapod.planning.limits.limit import LimitKind
@@ -71,6 +72,27 @@ def test_leans_follow_the_path_where_no_field_over_the_part_fits(desk, here):
     assert np.ptp(wanted) > 0.38
     turned = np.linalg.norm(np.diff(placed.axes, axis=0), axis=1)
     assert turned.max() < 0.1  # of the 0.2 from pass to pass: the axis sets out before
+
+
+def test_the_same_path_without_a_pass_keeps_placement_and_leans(desk, here):
+    """Also where it may move: what was found for the whole path holds for a part of it."""
+    path, asked = zigzag(), options(desk, here, 0.03)
+    whole = plan(path, desk, **asked)
+    cut = path.segments[0]
+    rest = Toolpath((replace(cut, tips=cut.tips[40:], axes=cut.axes[40:]),), path.tilt_centre)
+    near = PlacementConstraints.free(
+        low=here.translation - 0.02, high=here.translation + 0.02, reference=here, largest_turn=0.1
+    )
+    again = plan(rest, desk, **{**asked, "constraints": near}, start=whole)
+    assert isinstance(again, PlacedPath), str(again)
+    assert again.smallest_margin >= NEEDED_MARGIN
+    np.testing.assert_allclose(again.placement.transform.matrix, whole.placement.transform.matrix, atol=1e-12)
+    # Smoothed again, above all where the pass was; elsewhere they hardly change.
+    assert np.median(np.degrees(angle_between(again.axes, whole.axes[40:]))) < 3.0
+    # Where that plan does not keep the limits, both are searched for.
+    short = replace(whole, margins=whole.margins - 1.0)
+    other = plan(rest, desk, **{**asked, "constraints": near}, start=short)
+    assert np.abs(other.placement.transform.matrix - whole.placement.transform.matrix).max() > 1e-6
 
 
 def test_no_field_fits_there_but_every_waypoint_by_itself(desk, here):

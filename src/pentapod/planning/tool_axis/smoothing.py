@@ -169,6 +169,8 @@ class _Smoothing:
         In one step the linear model may have no solution where the margins themselves have one.
         """
         keep, short, levels = self.keep, self.short, self.options.levels
+        if short <= self.options.slack:
+            return True
         for k in range(1, levels + 1):
             self.aim(keep - short * (1.0 - k / levels))
             if self.smoothest(first=True) is None:
