@@ -96,7 +96,7 @@ class Coverage(Value):
             return cls.nothing(f"{type(options).__name__.removesuffix('Options').lower()}: lines that cover no region")
         region = Patch.whole(part).in_box(options.region)
         if rolls_over(tool, options):
-            region = _as_facets_lean(region, options.region, NOISE * (tool.scallop_radius or 0.0))
+            region = _as_facets_lean(region, options.region, NOISE * tool.tilt_centre)
         region = region.where_normals(options.region.faces)
         if isinstance(options, WaterlineOptions):
             upright, flattest = np.asarray(options.upright), options.shallowest
