@@ -67,6 +67,11 @@ class Patch:
         joins[topology.pair_edges] = topology.pair_agrees & same
         return joins
 
+    def side_ends(self, sides: Ints) -> Ints:
+        """Return the vertices (S, 2) at the ends of sides (S,); side 3 f + s runs from corner s of facet f to s + 1."""
+        corners = self.faces.ravel()
+        return np.stack([corners[sides], corners[sides - sides % 3 + (sides + 1) % 3]], axis=1)
+
     @cached_property
     def facet_normals(self) -> Floats:
         """Unit normals (F, 3) of the facets; zero for facets without area."""

@@ -15,6 +15,7 @@ from pentapod.machine.clearance.leg_clearance import clearances
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning.diagnosis import diagnose
+from pentapod.planning.limits.contacts import contacts
 from pentapod.planning.limits.limit import Comforts
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.ipopt import IpoptSolver
@@ -85,6 +86,7 @@ def test_limits_are_named_in_the_order_of_the_values(desk, crowd, place):
     tips, axes = poses(desk, 7)
     assert margins(tips, axes, place).shape == (7, len(listed))
     assert margins(tips.reshape(1, 7, 3), axes.reshape(1, 7, 3), place).shape == (1, 7, len(listed))
+    assert contacts(margins.scene, tips[:0], axes[:0], place).margins.shape == (0, 14)
 
 
 def test_gaps_between_legs_and_spindle_are_those_of_the_machine(desk):

@@ -7,9 +7,14 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 import pytest
+import trimesh
 
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.geometry.solids import Solid
+from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
+from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning import PlacedPath, PlacementConstraints, plan
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.placement.own_leans import OwnLeans
@@ -108,6 +113,22 @@ def test_no_field_fits_there_but_every_waypoint_by_itself(desk, here):
     assert problem.values_of(start.margins, here, leans).min() >= NEEDED_MARGIN
     mixed = problem.values_of(start.margins, here, own.mixed).min(axis=1)
     assert (mixed >= NEEDED_MARGIN).all()
+
+
+def test_where_all_own_leans_fit_near_the_field_none_is_left_to_try(desk, here):
+    """The tool body is near a post: no margins are asked for without a pose."""
+    post = trimesh.creation.box((0.02, 0.02, 0.03))
+    post.apply_translation([0.1, 0.0, 0.015])
+    world = CollisionWorld(
+        (Obstacle("fixture", MeshDistance.of(Mesh.of(post.vertices, post.faces)), clamped=True),),
+        (Solid("shank", 0.01, 0.05, 0.003, 0.003),),
+    )
+    asked = options(desk, here, 0.03)
+    samples = ToolpathSamples.of(zigzag(), TILT)
+    problem = PlacementProblem.of(samples, desk, asked["constraints"], limits=asked["limits"], collision_world=world)
+    own = OwnLeans.of(problem, problem.candidate(problem.margins[0], here, problem.upright))
+    few = replace(own, rows=own.rows[:0], margins=own.margins[:0], leans=own.leans[:0])
+    np.testing.assert_array_equal(few._near_the_field(), few.field)
 
 
 def test_what_does_not_fit_by_itself_is_refused_by_name(desk, here):

@@ -36,6 +36,11 @@ def none(points):
     return np.zeros(len(points), dtype=np.bool_)
 
 
+def closed(patch):
+    """No border of the patch lies in a corner."""
+    return np.zeros(0, dtype=np.intp), np.zeros((0, 3))
+
+
 def flat(x, y):
     return 0.0 * x + 0.0 * y
 
@@ -53,7 +58,7 @@ YS = np.arange(0.5 * STEP, 0.03, STEP)
 
 
 def test_passes_a_stepover_apart_leave_no_rest_on_a_plane():
-    assert len(rest_lines(sheet(flat), along_x(YS, flat), R, STEP, none)) == 0
+    assert len(rest_lines(sheet(flat), along_x(YS, flat), R, STEP, none, closed)) == 0
 
 
 @pytest.mark.parametrize("step", [3e-3, 1e-3, 0.4e-3, 0.1e-3])
@@ -67,24 +72,45 @@ def test_only_what_may_be_left_is_looked_at_closely_however_near_the_passes_are(
 
     monkeypatch.setattr(Patch, "refined", refined)
     ys = np.arange(0.5 * step, 0.03, step)
-    assert len(rest_lines(sheet(flat), along_x(ys, flat), R, step, none)) == 0
+    assert len(rest_lines(sheet(flat), along_x(ys, flat), R, step, none, closed)) == 0
     rim = 2 * 40 * 3  # between the first pass and the border lies half a stepover
     assert looked[0] <= rim
 
 
 def test_passes_wider_apart_than_the_ball_are_meant_so():
-    assert len(rest_lines(sheet(flat), along_x(YS[::3], flat), R, 3.0 * STEP, none)) == 0
+    assert len(rest_lines(sheet(flat), along_x(YS[::3], flat), R, 3.0 * STEP, none, closed)) == 0
 
 
 def test_a_pass_left_out_is_put_back_in_the_middle_of_the_gap():
     patch = sheet(flat)
-    found = rest_lines(patch, along_x(np.delete(YS, 4), flat), R, STEP, none)
+    found = rest_lines(patch, along_x(np.delete(YS, 4), flat), R, STEP, none, closed)
     assert len(found) == 1
     assert np.abs(found.points[:, 1] - YS[4]).max() < 0.3 * STEP
     assert np.ptp(found.points[:, 0]) > 0.018
     assert (
-        len(rest_lines(patch, along_x(np.delete(YS, 4), flat), R, STEP, lambda x: np.abs(x[:, 1] - YS[4]) < STEP)) == 0
+        len(
+            rest_lines(
+                patch, along_x(np.delete(YS, 4), flat), R, STEP, lambda x: np.abs(x[:, 1] - YS[4]) < STEP, closed
+            )
+        )
+        == 0
     )
+
+
+def test_the_corner_at_a_border_gets_a_line_where_the_last_pass_leaves_too_much():
+    """A wall rises at y = 0, beyond the patch; the last pass is 1.3 mm from it: on the floor itself nothing is left."""
+
+    def wall(patch):
+        side = np.flatnonzero(patch.topology.facets_at_edge[patch.topology.edge_of_side.ravel()] == 1)
+        side = side[(patch.vertices[patch.side_ends(side)][:, :, 1] < 1e-9).all(axis=1)]
+        return side, np.tile([0.0, 1.0, 0.0], (len(side), 1))
+
+    patch, passes = sheet(flat), along_x(1.3e-3 + np.arange(0.0, 0.028, STEP), flat)
+    assert len(rest_lines(patch, passes, R, STEP, none, closed)) == 0
+    found = rest_lines(patch, passes, R, STEP, none, wall)
+    assert len(found) == 1
+    assert found.points[:, 1].max() < 0.3e-3
+    assert np.ptp(found.points[:, 0]) > 0.018
 
 
 def test_the_bottom_of_a_hollow_gets_a_line_where_passes_beside_it_leave_too_much():
@@ -93,7 +119,7 @@ def test_the_bottom_of_a_hollow_gets_a_line_where_passes_beside_it_leave_too_muc
     beside = apart + np.arange(0.0, 0.016, STEP / np.sqrt(2.0))
     ys = np.concatenate([0.015 + beside, 0.015 - beside])
     passes = along_x(ys, hollow)
-    found = rest_lines(sheet(hollow, cells=120), passes, R, STEP, none)
+    found = rest_lines(sheet(hollow, cells=120), passes, R, STEP, none, closed)
     bottom = np.stack([np.linspace(2e-3, 0.018, 50), np.full(50, 0.015), np.full(50, -R)], axis=1)
     before = KDTree(np.concatenate([dense(passes.points[passes.rows(k)]) for k in range(len(passes))]))
     assert before.query(bottom)[0].min() - R > 1.3 * RIDGE
@@ -112,7 +138,7 @@ def test_the_bottom_of_a_pit_gets_a_line_where_passes_beside_it_leave_too_much()
 
     beside = STEP * np.arange(0.5, 5.0)
     found = rest_lines(
-        sheet(pit, cells=150), along_x(np.concatenate([0.015 + beside, 0.015 - beside]), pit), R, STEP, none
+        sheet(pit, cells=150), along_x(np.concatenate([0.015 + beside, 0.015 - beside]), pit), R, STEP, none, closed
     )
     bottom = np.array([0.01, 0.015, -R])
     assert np.linalg.norm(found.points - bottom - [0.0, 0.0, R], axis=1).min() < 3e-4

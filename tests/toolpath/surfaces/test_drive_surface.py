@@ -210,6 +210,38 @@ def test_region_box_bounds_the_contacts_not_the_centres(pocket):
     assert patch.vertices[:, 0].max() == pytest.approx(20e-3, abs=1e-4)
 
 
+def test_a_region_that_ends_at_the_foot_of_walls_ends_in_a_corner_there(pocket):
+    """Upper faces end at convex edges, the floor at the feet of its walls: these alone are corners."""
+    patch = pocket.patch(Region(angle=np.radians(50.0)))
+    sides, beyond = pocket.rising(patch)
+    middles = patch.vertices[patch.side_ends(sides)].mean(axis=1)
+    np.testing.assert_allclose(middles[:, 2], 9e-3, atol=1e-5)
+    np.testing.assert_allclose(np.abs(beyond).max(axis=1), 1.0, atol=1e-6)
+    np.testing.assert_allclose(beyond[:, 2], 0.0, atol=1e-6)
+    around = np.linalg.norm(np.diff(patch.vertices[patch.side_ends(sides)], axis=1)[:, 0], axis=1).sum()
+    assert around == pytest.approx(2.0 * (18e-3 + 10e-3), rel=0.05)
+    assert pocket.feet(patch).sum() == len(sides)
+    assert not pocket.feet(pocket.patch(Region(angle=np.radians(90.0)))).any()
+
+
+@pytest.mark.parametrize("degrees", [50.0, 80.0])
+def test_no_more_than_a_ridge_is_left_at_the_foot_of_walls_that_are_not_machined(pocket, degrees):
+    """On the floor up to its walls, beyond what the ball forbids: its limit and its swept balls are known."""
+    step = 3e-3
+    options = RasterOptions(stepover=step, direction=np.radians(90.0), region=Region(angle=np.radians(degrees)))
+    toolpath = make_toolpath(pocket.part, BallCutter(R), options)
+    lines = [s.tips + R * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT]
+    centres = np.concatenate([dense([line], 40) for line in lines])
+    x, y = np.meshgrid(np.linspace(8e-3, 32e-3, 121), np.linspace(7e-3, 23e-3, 81))
+    floor = np.stack([x.ravel(), y.ravel(), np.full(x.size, 6e-3)], axis=1)
+    nearest = np.clip(floor, [11e-3, 10e-3, 9e-3], [29e-3, 20e-3, 9e-3])
+    towards = (nearest - floor) / np.linalg.norm(nearest - floor, axis=1)[:, None]
+    allowed = 1.25 * (R - np.sqrt(R**2 - 0.25 * step**2)) + 3e-5
+    places = nearest - (R - allowed) * towards
+    missed = KDTree(centres).query(places)[0] > R
+    assert missed.mean() < 1e-3
+
+
 def test_the_ball_does_not_roll_around_an_open_border_but_bridges_a_small_hole():
     x, y = (k.ravel() for k in np.meshgrid(np.linspace(0.0, 0.04, 41), np.linspace(0.0, 0.03, 31), indexing="ij"))
     cell = np.array(

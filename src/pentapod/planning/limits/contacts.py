@@ -107,7 +107,7 @@ def contacts(
                 known = _with_gaps(gaps[rows, k], cap)
             columns.append(_tool(obstacle, tool, bodies, cap, numbers=numbers) if known is None else known)
         both[rows, k * moving : (k + 1) * moving] = np.stack(columns, axis=1)
-    return Contacts(both[..., 0] / comfortable, both[..., 1:].reshape(len(tips), -1))
+    return Contacts(both[..., 0] / comfortable, both[..., 1:].reshape(len(tips), NUMBERS * len(comfortable)))
 
 
 def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts: Sequence[float]) -> list[Floats]:

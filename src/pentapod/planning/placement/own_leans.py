@@ -90,6 +90,8 @@ class OwnLeans:
         """Return leans (N, 3) that fit, each as near as may be to that of the field."""
         found, left = self.mixed, np.arange(len(self.rows))
         for share in OPTIONS.shares:
+            if not len(left):
+                break
             rows = self.rows[left]
             trial = self.field[rows] + share * (self.leans[left] - self.field[rows])
             values = self.problem.values_of(self.at.margins, self.at.transform, trial, rows)

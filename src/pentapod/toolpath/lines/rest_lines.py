@@ -22,6 +22,9 @@ from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.topology import components
 
+Rising = tuple[Ints, Floats]
+"""Sides (S,) of facets at which a patch ends in a corner, and the normals (S, 3) of what rises beyond."""
+
 
 @dataclass(frozen=True)
 class RestOptions:
@@ -58,13 +61,14 @@ def rest_lines(
     radius: float,
     stepover: float,
     hides: Callable[[Floats], Bools],
+    rising: Callable[[Patch], Rising],
     shortest: float = 0.0,
     options: RestOptions = RestOptions(),
 ) -> Passes:
     """Return lines over what passes leave on a patch of the offset surface of a ball of `radius` metres.
 
-    stepover: between the passes, metres. hides: tells which points (N, 3) cannot be machined. shortest: metres; what is
-    shorter is no pass.
+    stepover: between the passes, metres. hides: tells which points (N, 3) cannot be machined. rising: finds
+    where a patch ends in a corner. shortest: metres; what is shorter is no pass.
     """
     half = min(0.5 * stepover, radius)
     height = options.allowed * (radius - float(np.sqrt(radius**2 - half**2)))
@@ -75,11 +79,12 @@ def rest_lines(
     centres, parts = _dense(passes.where(passes.lengths >= shortest), step), list[Passes]()
     if not len(centres):
         return Passes.joined([])
-    coarse = _left(patch, KDTree(centres), radius, options.coarse * height, options) > 0.0
+    coarse = _left(patch, rising(patch), KDTree(centres), radius, options.coarse * height, options) > 0.0
     coarse[coarse] = ~hides(patch.vertices[patch.faces[coarse]].mean(axis=1))
     near = patch.only(_grown(patch, coarse, 1)).refined(options.edge * stepover)
+    ends = rising(near)
     for _ in range(options.rounds):
-        left = _left(near, KDTree(centres), radius, height, options)
+        left = _left(near, ends, KDTree(centres), radius, height, options)
         left[left > 0.0] *= ~hides(near.vertices[near.faces[left > 0.0]].mean(axis=1))
         lines = _lines(near, left, options.negligible * whole, options.shortest * stepover, options)
         if not len(lines):
@@ -98,7 +103,7 @@ def _dense(passes: Passes, step: float) -> Floats:
     return start[owner] + (number / np.maximum(counts - 1, 1)[owner])[:, None] * along[owner]
 
 
-def _left(patch: Patch, tree: KDTree, radius: float, height: float, options: RestOptions) -> Floats:
+def _left(patch: Patch, rising: Rising, tree: KDTree, radius: float, height: float, options: RestOptions) -> Floats:
     """Return by how much (F,) each facet is not cleared down to a height, metres; 0 where it is."""
     normals, corners = patch.facet_normals, patch.vertices[patch.faces]
     depth, left = radius - height, np.zeros(len(patch.faces))
@@ -118,15 +123,25 @@ def _left(patch: Patch, tree: KDTree, radius: float, height: float, options: Res
         more = _beyond(tree, edges - depth * between, edges, radius)
         np.maximum.at(left, a, more)
         np.maximum.at(left, b, more)
-    return np.maximum(left, _left_in_pits(patch, tree, radius, depth, options)[patch.faces].max(axis=1))
+    # The half of an arc that is nearer to what rises beyond the patch is not under it.
+    sides, beyond = rising
+    ends = patch.vertices[patch.side_ends(sides)].mean(axis=1)
+    for share in (0.25, 0.5):
+        between = normalised((1.0 - share) * normals[sides // 3] + share * beyond)
+        np.maximum.at(left, sides // 3, _beyond(tree, ends - depth * between, ends, radius))
+    return np.maximum(left, _left_in_pits(patch, rising, tree, radius, depth, options)[patch.faces].max(axis=1))
 
 
-def _left_in_pits(patch: Patch, tree: KDTree, radius: float, depth: float, options: RestOptions) -> Floats:
+def _left_in_pits(
+    patch: Patch, rising: Rising, tree: KDTree, radius: float, depth: float, options: RestOptions
+) -> Floats:
     """Return by how much (V,) each vertex is not cleared along the mean of the normals around it, metres.
 
     At the bottom of a pit, where the ball touches three walls, that is where most is left. 0 where it is not bent.
     """
-    corners, normals = patch.faces.ravel(), np.repeat(patch.facet_normals, 3, axis=0)
+    sides, beyond = rising
+    corners = np.concatenate([patch.faces.ravel(), patch.side_ends(sides).ravel()])
+    normals = np.concatenate([np.repeat(patch.facet_normals, 3, axis=0), np.repeat(beyond, 2, axis=0)])
     mean = np.stack([np.bincount(corners, weights=normals[:, k], minlength=len(patch.vertices)) for k in range(3)], 1)
     mean = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
     least = np.ones(len(mean))

@@ -126,7 +126,7 @@ def with_fills(surface: Surface, paths: ContactPaths, options: PathOptions) -> C
     hides = partial(surface.hides, slack=options.chordal)
     rest = Passes.of([])
     if isinstance(surface, DriveSurface):
-        rest = rest_lines(patch, passes, surface.radius, paths.stepover, hides, options.shortest)
+        rest = rest_lines(patch, passes, surface.radius, paths.stepover, hides, surface.rising, options.shortest)
     return replace(paths, passes=Passes.joined([passes, rest])) if len(creases) + len(rest) else paths
 
 

@@ -14,9 +14,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.spatial import KDTree
 
-from pentapod.base.arrays import Bools, Floats
+from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.mesh import Mesh
+from pentapod.mesh.normals import unit_or_zero
 from pentapod.mesh.offset.offset_surface import Window, offset_surface
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
@@ -135,6 +136,28 @@ class DriveSurface(RolledSurface):
         away = _distance(patch.vertices[beyond <= 0.0], above, about)
         missed = above[(away > self.radius) & (away < np.inf)]
         return (beyond > 0.0) & (_distance(missed, patch.vertices, about) < np.inf)
+
+    def feet(self, patch: Patch) -> Bools:
+        """Return which edges (E,) of a patch are its borders along a corner: without a pass much is left under it."""
+        foot = np.zeros(len(patch.topology.edges), dtype=np.bool_)
+        foot[patch.topology.edge_of_side.ravel()[self.rising(patch)[0]]] = True
+        return foot
+
+    def rising(self, patch: Patch) -> tuple[Ints, Floats]:
+        """Return the sides (S,) of facets at which a patch ends in a corner, and normals (S, 3) of what rises beyond.
+
+        A region that ends by its angle at the foot of a wall ends there.
+        """
+        topology = patch.topology
+        side = np.flatnonzero(topology.facets_at_edge[topology.edge_of_side.ravel()] == 1)
+        ends = patch.vertices[patch.side_ends(side)]
+        out = unit_or_zero(np.cross(ends[:, 1] - ends[:, 0], patch.facet_normals[side // 3]))
+        step, middles = self.options.border * self.radius * out, ends.mean(axis=1)
+        within, beyond = self._normals(middles - step), self._normals(middles + step)
+        bent = np.einsum("ni,ni->n", within, beyond) < np.cos(self.options.crease)
+        higher = np.einsum("ni,ni->n", beyond - within, out) < 0.0
+        foot = bent & higher & (beyond @ self.view > -self.options.wall)
+        return side[foot], beyond[foot]
 
     def _normals(self, points: Floats) -> Floats:
         away = self.centres.tree.closest(points)[1]
