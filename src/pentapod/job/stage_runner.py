@@ -9,6 +9,7 @@ from typing import Any, Self, TypeVar
 
 from pentapod.base.progress import Progress
 from pentapod.base.values import Value
+from pentapod.numerics.memory import give_back
 
 T = TypeVar("T")
 
@@ -39,6 +40,7 @@ class StageRunner:
 
     def run(self, name: str, stage: Callable[[], T], remark: Callable[[T], str] = lambda _: "") -> T:
         """Return the result of a stage and record it. remark: returns a text about the result."""
+        give_back()
         self.progress(name, 0.0)
         start = time.perf_counter()
         value = stage()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +10,12 @@ import numpy as np
 from pentapod.base.arrays import Bools, Floats
 from pentapod.geometry.runs import marked_runs
 from pentapod.machine.machine import Machine
+from pentapod.numerics.blocks import blocks
 from pentapod.report.signals import Signals
 from pentapod.report.words import number
+
+ROWS_AT_ONCE = 1 << 15
+"""Rows that are looked at together, to bound the memory."""
 
 FULL_FEED = 0.98
 """Share of the programmed feed from which a cut counts as running at full feed."""
@@ -34,20 +39,21 @@ def worst_places(signals: Signals, machine: Machine) -> list[WorstPlace]:
     name = signals.margin_names[int(signals.margins[least].argmin())]
     row = int(signals.margin_rows[least])
     places = [_place(signals, f"smallest margin: {name}", number(float(signals.smallest_margins[least])), row)]
-    rows = (
-        ("shortest against its stroke", (signals.legs - limits.min_length), "mm above the shortest"),
-        ("longest against its stroke", (limits.max_length - signals.legs), "mm below the longest"),
+    strokes: tuple[tuple[str, Callable[[Floats], Floats], str], ...] = (
+        ("shortest", lambda legs: legs - limits.min_length, "mm above the shortest"),
+        ("longest", lambda legs: limits.max_length - legs, "mm below the longest"),
     )
-    for what, room, words in rows:
-        row, leg = _argmin(room)
-        places.append(_place(signals, f"leg {leg + 1}, {what}", f"{1e3 * room[row, leg]:.2f} {words}", row))
-    shares = (
-        ("rate", np.abs(signals.rates) / limits.max_velocity, 1e3 * signals.rates, "mm/s"),
-        ("acceleration", np.abs(signals.accelerations) / limits.max_acceleration, 1e3 * signals.accelerations, "mm/s²"),
+    for what, room, words in strokes:
+        row, leg, least_room = _least(room, signals.legs)
+        value = f"{1e3 * least_room:.2f} {words}"
+        places.append(_place(signals, f"leg {leg + 1}, {what} against its stroke", value, row))
+    motion = (
+        ("rate", signals.rates, limits.max_velocity, "mm/s"),
+        ("acceleration", signals.accelerations, limits.max_acceleration, "mm/s²"),
     )
-    for what, share, values, unit in shares:
-        row, leg = _argmin(-share)
-        value = f"{number(abs(float(values[row, leg])), unit)}, {share[row, leg]:.1%} of the limit"
+    for what, values, limit, unit in motion:
+        row, leg, share = _least(lambda values, limit=limit: -np.abs(values) / limit, values)
+        value = f"{number(1e3 * abs(float(values[row, leg])), unit)}, {-share:.1%} of the limit"
         places.append(_place(signals, f"leg {leg + 1}, largest {what}", value, row))
     if signals.cutting.any():
         slow = signals.cutting & (signals.speeds < FULL_FEED * signals.speed_limits)
@@ -59,9 +65,15 @@ def worst_places(signals: Signals, machine: Machine) -> list[WorstPlace]:
     return places
 
 
-def _argmin(values: Floats) -> tuple[int, int]:
-    row, leg = np.unravel_index(int(values.argmin()), values.shape)
-    return int(row), int(leg)
+def _least(of: Callable[[Floats], Floats], values: Floats) -> tuple[int, int, float]:
+    """Return row and column of the least number that is made of values (N, C), block by block, and that number."""
+    found = 0, 0, np.inf
+    for part in blocks(len(values), ROWS_AT_ONCE):
+        made = of(values[part])
+        row, column = np.unravel_index(int(made.argmin()), made.shape)
+        if made[row, column] < found[2]:
+            found = part.start + int(row), int(column), float(made[row, column])
+    return found
 
 
 def _place(signals: Signals, what: str, value: str, row: int) -> WorstPlace:

@@ -24,6 +24,7 @@ from pentapod.job.ways.claims import with_ways
 from pentapod.job.ways.ways import remove_ways, ways, write_ways
 from pentapod.job.withheld import withheld
 from pentapod.machine.machine import Machine
+from pentapod.numerics.memory import give_back
 from pentapod.planning import PlacedPath
 from pentapod.program import Program
 from pentapod.toolpath import Mesh, Toolpath
@@ -121,6 +122,7 @@ class Attempt:
         if (placed := outcome.find(PlacedPath)) is not None:
             outcome = dataclasses.replace(outcome, machine=task.on(placed.placement).machine)
         write_arrays(array_parts(outcome, unstaged(staging)), staging / ARRAYS)
+        give_back()
         for name, write in self.writers.items():
             self.runner.progress("report", 0.0, name)
             write(outcome, staging / name)

@@ -20,6 +20,7 @@ from pentapod.kinematics.arithmetic import NUMPY, Arithmetic, Joints
 from pentapod.kinematics.robot import Branch, own_branch
 from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.machine import Machine
+from pentapod.numerics.blocks import blocks
 from pentapod.planning.limits.base_joints import BaseJointCone
 from pentapod.planning.limits.contacts import NUMBERS, contacts
 from pentapod.planning.limits.leg_pairs import LegPairClearance
@@ -32,6 +33,9 @@ from pentapod.planning.limits.platform_joints import PlatformJointAngle
 from pentapod.planning.limits.singular_surfaces import SurfaceDistance
 from pentapod.planning.limits.strokes import LegStroke
 from pentapod.planning.limits.tool_pose import ToolPose, WorkpieceContacts
+
+BLOCK = 16_384
+"""Poses whose margins are computed at a time."""
 
 LIMITS = Registry("limit", "pentapod.limits", LimitKind)
 """The kinds of limits by name, in the order of the margins; those to obstacles come after them.
@@ -85,12 +89,24 @@ class Margins:
         return Margins.of(self.scene.machine, self.scene.branch, collision_world, self.kinds)
 
     def __call__(
-        self, tips: Floats, axes: Floats, placement: RigidTransform | None = None, gaps: Floats | None = None
+        self,
+        tips: Floats,
+        axes: Floats,
+        placement: RigidTransform | None = None,
+        gaps: Floats | None = None,
+        block: int = BLOCK,
     ) -> Floats:
         """Return margins (..., M) of tool tips and axes (tip → spindle), both (..., 3), machine frame.
 
-        placement: of the workpiece; needed where there are obstacles. gaps (..., obstacles): as for `contacts`.
+        placement: of the workpiece; needed where there are obstacles. gaps (..., obstacles): as for `contacts`. block:
+        poses at a time, to bound the memory.
         """
+        if tips.ndim == 2 and len(tips) > block:
+            parts = blocks(len(tips), block)
+            known = (None if gaps is None else gaps[part] for part in blocks(len(tips), block))
+            return np.concatenate(
+                [self(tips[part], axes[part], placement, own) for part, own in zip(parts, known, strict=True)]
+            )
         own = self.own(tips, axes)
         if not self.scene.collision_world.obstacles:
             return own
@@ -101,14 +117,13 @@ class Margins:
         outer = contacts(self.scene, *poses, placement, numbers=False, gaps=known).margins
         return np.concatenate([own, outer.reshape(*own.shape[:-1], -1)], axis=-1)
 
-    def own(self, tips: Floats, axes: Floats, block: int = 16_384) -> Floats:
+    def own(self, tips: Floats, axes: Floats, block: int = BLOCK) -> Floats:
         """Return the margins (..., M) of the machine alone. block: poses at a time, to bound the memory.
 
         Those of one limit lie together in memory, so that the smallest of each pose is found several times as fast.
         """
         if tips.ndim == 2 and len(tips) > block:
-            blocks = range(0, len(tips), block)
-            return np.concatenate([self.own(tips[k : k + block], axes[k : k + block]) for k in blocks])
+            return np.concatenate([self.own(tips[part], axes[part]) for part in blocks(len(tips), block)])
         tip, axis = list(np.moveaxis(tips, -1, 0)), list(np.moveaxis(axes, -1, 0))
         pose = ToolPose(self.scene.machine, self.scene.branch, tip, axis, NUMPY)
         values = np.broadcast_arrays(*(limit.margin(pose) for limit in self.own_limits))

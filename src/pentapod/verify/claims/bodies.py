@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from pentapod.base.arrays import Ints
+from pentapod.base.arrays import Floats, Ints
 from pentapod.machine.clearance.leg_clearance import clearances, pair_names
-from pentapod.numerics.blocks import blocks
+from pentapod.machine.machine import Machine
+from pentapod.numerics.blocks import blocks, in_blocks
 from pentapod.verify.replay.claim import MM, Claim, Finding
 from pentapod.verify.replay.replay import Replay
 
@@ -29,7 +32,7 @@ def clearance(replay: Replay) -> Finding:
     starts = np.arange(0, len(travelled), STRETCH)
     ends = np.append(starts[1:], len(chords))
     middles = (starts + ends) // 2
-    at_middle = clearances(machine, position[middles], direction[middles]).min(axis=1)
+    at_middle = in_blocks(partial(_least_clearance, machine), position[middles], direction[middles])
     travel = np.maximum(travelled[middles] - travelled[starts], travelled[ends] - travelled[middles])
     close = np.flatnonzero(at_middle - 2.0 * travel <= at_middle.min())
     samples = (starts[close, None] + np.arange(STRETCH)).ravel()
@@ -50,6 +53,10 @@ def clearance(replay: Replay) -> Finding:
         "the rows and halfway between, less the largest possible approach until the next sample"
     )
     return Finding(least > 0.0, MM * least, 0.0, "mm", replay.place(at), method, at_least=True)
+
+
+def _least_clearance(machine: Machine, position: Floats, direction: Floats) -> Floats:
+    return clearances(machine, position, direction).min(axis=1)
 
 
 CLAIMS = (Claim("clearance between legs and shaft", clearance, needs_proof=True),)

@@ -11,10 +11,14 @@ from pentapod.base.arrays import Bools
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.solids import Solid
 from pentapod.mesh.query.distance import MeshDistance
+from pentapod.numerics.blocks import blocks
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.gouge_bounds import GougeBound, gouge_bound
 from pentapod.verify.replay.replay import Replay
+
+CHORDS_AT_ONCE = 1 << 15
+"""Chords that are looked at together, to bound the memory."""
 
 THICKNESS_SHARE = 0.9
 """Share of the cutter's thickness: deeper gouges are judged on the cutter raised along its axis."""
@@ -68,9 +72,13 @@ def rapid_chords(replay: Replay) -> Bools:
     ends = arc_length(toolpath.tilt_centres)[toolpath.starts]
     other = np.array([segment.kind is not SegmentKind.RAPID for segment in toolpath.segments])
     before = np.concatenate([[0], np.cumsum(other)])
-    first = np.searchsorted(ends[1:], arcs[:-1] - replay.match_radius, side="left")
-    behind = np.minimum(np.searchsorted(ends, arcs[1:] + replay.match_radius, side="right"), len(other))
-    return np.asarray(before[behind] == before[first])
+    found = np.empty(len(arcs) - 1, dtype=np.bool_)
+    for part in blocks(len(found), CHORDS_AT_ONCE):
+        first = np.searchsorted(ends[1:], arcs[part] - replay.match_radius, side="left")
+        last = arcs[part.start + 1 : part.stop + 1] + replay.match_radius
+        behind = np.minimum(np.searchsorted(ends, last, side="right"), len(other))
+        found[part] = before[behind] == before[first]
+    return found
 
 
 def begins_inside(replay: Replay, surface: MeshDistance, cutter: tuple[Solid, ...]) -> bool:

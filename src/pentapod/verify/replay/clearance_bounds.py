@@ -243,6 +243,6 @@ def leg_control_points(replay: Replay, intervals: Ints) -> Floats:
     legs, slopes = replay.program.legs, replay.slopes
     if slopes is None:
         return np.concatenate([legs[intervals], legs[intervals[:, -1:] + 1]], axis=1)
-    third = slopes / 3.0
     start, end = legs[intervals], legs[intervals + 1]
-    return np.concatenate([start, start + third[intervals], end - third[intervals + 1], end[:, -1:]], axis=1)
+    near, far = slopes[intervals] / 3.0, slopes[intervals + 1] / 3.0
+    return np.concatenate([start, start + near, end - far, end[:, -1:]], axis=1)

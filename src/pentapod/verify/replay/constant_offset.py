@@ -32,7 +32,7 @@ def constant_offset(replay: Replay) -> Offset | None:
     if np.linalg.norm(first) < SMALLEST_SHARE * replay.path_tolerance:
         return None
     along = float(first @ replay.axes[0])
-    if (distances := _distances_without(replay, along * replay.axes)) is not None:
+    if (distances := _distances_without(replay, along * replay.axes[:])) is not None:
         which = "longer" if along > 0.0 else "shorter"
         length = f"a tool that is {MM * abs(along):.3f} mm {which} than the job's"
         return Offset(f"the program seems to be made for {length}", distances)
@@ -49,10 +49,10 @@ def _distances_without(replay: Replay, offset: Floats) -> Floats | None:
     offset (3,) or (M, 3): metres. None where the program is beyond the tolerance without it as well.
     """
     points, allowed = replay.toolpath.tilt_centres, with_allowance(replay.path_tolerance)
-    tilt_centres = replay.tilt_centres - offset
+    tilt_centres = replay.tilt_centres[:] - offset
     if np.linalg.norm(tilt_centres[-1] - points[-1]) > allowed:
         return None  # before the long computation
     found = replay.matched(tilt_centres)
     if found.distances.max() > allowed or found.waypoint_distances.max() > allowed:
         return None
-    return row_lengths(replay.tilt_centres - points_at(points, found.places))
+    return row_lengths(replay.tilt_centres[:] - points_at(points, found.places))

@@ -83,7 +83,7 @@ class FreeSpace:
         None where there is none, or the diagram is too large. by_axis: also within the bound of the axes. more: metres
         added to the radius where axes have a weight.
         """
-        return self._search(np.full(self._samples - 1, radius), by_axis=by_axis, more=more)[1]
+        return self._search(radius, by_axis=by_axis, more=more)[1]
 
     def largest(self, pairing: Pairing, distances: Floats, waypoint_distances: Floats) -> float:
         """Return the largest of distances (M,) and (n,), each with the deviation of the motion from its chord.
@@ -93,10 +93,11 @@ class FreeSpace:
         chord = np.minimum(pairing.times.astype(np.intp), len(self._deviations) - 1)
         at_samples = np.append(self._deviations, 0.0)
         np.maximum(at_samples[1:], self._deviations, out=at_samples[1:])
+        at_samples += distances
         samples, waypoints = self._weights[0][pairing.intervals] == 0.0, self._weights[1] == 0.0
         samples[[0, -1]] = waypoints[[0, -1]] = True
         of_waypoints = (waypoint_distances + self._deviations[chord])[waypoints]
-        return float(max((distances + at_samples)[samples].max(), of_waypoints.max()))
+        return float(max(at_samples.max(where=samples, initial=-np.inf), of_waypoints.max()))
 
     def patched(self, radius: float) -> Pairing | None:
         """Return a matching within the radius, which is widened where the motion leaves the path.
@@ -127,8 +128,10 @@ class FreeSpace:
         highest[0], lowest[-1] = 0.0, waypoints[-1]
         return Pairing(intervals, lowest, highest, times, 0.0)
 
-    def _search(self, radii: Floats, *, by_axis: bool, more: float = 0.0) -> tuple[int, Pairing | None]:
+    def _search(self, radii: Floats | float, *, by_axis: bool, more: float = 0.0) -> tuple[int, Pairing | None]:
         """Return the number of samples that are reached within radii (M − 1,), −1 for too many cells; and the matching.
+
+        One radius stands for all.
 
         The matching is None unless all samples are reached.
         """
@@ -145,16 +148,16 @@ class FreeSpace:
             return reached, None
         intervals, chords = np.empty(self._samples, dtype=np.intp), np.empty(self._waypoints, dtype=np.intp)
         kernels.trace(cells, routed, intervals, chords)
-        sides = np.empty((self._samples + self._waypoints, 3))
-        kernels.free_sides(self._motion, self._path, bounds, self._weights, intervals, chords, sides)
-        samples, waypoints = sides[: self._samples, :2], sides[self._samples :]
+        del cells  # as large as what is made now
+        samples, waypoints = np.empty((self._samples, 2)), np.empty((self._waypoints, 3))
+        kernels.free_sides(self._motion, self._path, bounds, self._weights, intervals, chords, samples, waypoints)
         samples += intervals[:, None]
         waypoints += chords[:, None]
         # The matching begins and ends with both curves.
         samples[0], samples[-1] = 0.0, self._waypoints - 1.0
         waypoints[0], waypoints[-1] = 0.0, self._samples - 1.0
         times = _ordered(waypoints[:, 2], waypoints[:, 0], waypoints[:, 1])
-        return reached, Pairing(intervals, samples[:, 0], samples[:, 1], times, max(float(radii.max()) + spare, 0.0))
+        return reached, Pairing(intervals, samples[:, 0], samples[:, 1], times, max(float(np.max(radii)) + spare, 0.0))
 
 
 def _curve(line: PosedPolyline) -> tuple[Floats, Floats]:
@@ -164,6 +167,8 @@ def _curve(line: PosedPolyline) -> tuple[Floats, Floats]:
 
 def _ordered(wanted: Floats, lowest: Floats, highest: Floats) -> Floats:
     """Return values in order within bounds that permit one, near the wanted ones."""
-    late, early = np.maximum.accumulate(wanted), np.minimum.accumulate(wanted[::-1])[::-1]
+    found = np.maximum.accumulate(wanted)
+    found += np.minimum.accumulate(wanted[::-1])[::-1]
+    found *= 0.5
     low, high = np.maximum.accumulate(lowest), np.minimum.accumulate(highest[::-1])[::-1]
-    return np.clip(0.5 * (late + early), low, np.maximum(low, high))
+    return np.clip(found, low, np.maximum(low, high, out=high), out=found)

@@ -257,18 +257,27 @@ def trace(cells: Cells, by_route: bool, interval: Ints, chord: Ints) -> None:
 
 @kernel
 def free_sides(
-    motion: Curve, path: Curve, bounds: Bounds, weights: Weights, interval: Ints, chord: Ints, sides: Floats
+    motion: Curve,
+    path: Curve,
+    bounds: Bounds,
+    weights: Weights,
+    interval: Ints,
+    chord: Ints,
+    at_samples: Floats,
+    at_waypoints: Floats,
 ) -> None:
-    """Fill sides (M + n, 3): from and to of the free part of each side of a route; of waypoints the cheapest place."""
+    """Fill the free part of each side of a route: at_samples (M, 2) and at_waypoints (n, 3), from and to.
+
+    Of waypoints also the cheapest place.
+    """
     chords, samples, more, turns = bounds
     for i in range(len(interval)):
         k = interval[i]
         near = samples[i] + (more if weights[0][k] > 0.0 else 0.0)
-        sides[i, 0], sides[i, 1] = free(motion, i, path, k, float(near), float(turns[k]))
+        at_samples[i, 0], at_samples[i, 1] = free(motion, i, path, k, float(near), float(turns[k]))
     for k in range(len(chord)):
         i, turn = chord[k], max(turns[max(k - 1, 0)], turns[min(k, len(turns) - 1)])
         near = chords[i] + (more if weights[1][k] > 0.0 else 0.0)
         low, high = free(path, k, motion, i, float(near), float(turn))
         at, _ = closest(path, k, motion, i, weights[1][k], low, high)
-        row = len(interval) + k
-        sides[row, 0], sides[row, 1], sides[row, 2] = low, high, at
+        at_waypoints[k, 0], at_waypoints[k, 1], at_waypoints[k, 2] = low, high, at

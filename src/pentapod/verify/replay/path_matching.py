@@ -87,7 +87,8 @@ def match(
     near_turn = np.append(turning, False) | np.append(False, turning)
     scale, within, wide = (tolerance / options.axis_scale) ** 2, options.within * tolerance, options.wide * tolerance
     weights = (np.where(turning, scale, 0.0), np.where(near_turn, scale, 0.0), within**2)
-    deviations = np.where(np.isfinite(deviations), deviations, 0.0)
+    if not (finite := np.isfinite(deviations)).all():
+        deviations = np.where(finite, deviations, 0.0)
     space = FreeSpace(motion, path, weights, deviations, axis_bound, options.search)
 
     def measured(pairing: Pairing) -> PathMatch:

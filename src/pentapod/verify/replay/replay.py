@@ -14,7 +14,6 @@ from pentapod.base.progress import Progress, silent
 from pentapod.base.values import Value
 from pentapod.geometry.interpolant import clamped_slopes
 from pentapod.geometry.polyline import arc_length
-from pentapod.geometry.rigid import RigidTransform
 from pentapod.machine.dynamics.deflection import Yielding, leg_pushes, tip_shift
 from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
@@ -31,6 +30,30 @@ from pentapod.verify.verdict.verdict import Place
 
 REPLAY_SHARE = 0.6
 """Share of the time of a verdict that the interval bounds take, for progress bars."""
+
+
+@dataclass(frozen=True, eq=False)
+class OfSamples:
+    """Vectors of `count` samples, computed where they are asked for: of all of them they take much memory.
+
+    at: returns those of some rows (n, 3), or of one (3,).
+    """
+
+    count: int
+    at: Callable[[Any], Floats]
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, rows: slice | Ints | int) -> Floats:
+        """Return the vectors of some rows."""
+        if not isinstance(rows, slice) or len(own := range(self.count)[rows]) <= ROWS_AT_ONCE:
+            return self.at(rows)
+        found = np.empty((len(own), 3))
+        for part in blocks(len(own), ROWS_AT_ONCE):
+            few = own[part]
+            found[part] = self.at(slice(few.start, few.stop, few.step))
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,33 +134,27 @@ class Replay(Value):
         return np.flatnonzero(~np.isfinite(position[:, 0] + direction[:, 0]))
 
     @cached_property
-    def axes(self) -> Floats:
+    def axes(self) -> OfSamples:
         """Tool axes (M, 3) at the samples, tip → spindle, workpiece frame by the header's placement."""
-        return self._in_work(lambda inverse, _, direction: inverse.rotate(-direction))
+        direction, inverse = self.pose[1], self.program.placement.inverse()
+        return OfSamples(len(direction), lambda rows: inverse.rotate(-direction[rows]))
 
     @cached_property
-    def tilt_centres(self) -> Floats:
+    def tilt_centres(self) -> OfSamples:
         """Tilt centres (M, 3) at the samples, workpiece frame, metres."""
-        along = self.machine.tool_length - self.toolpath.tilt_centre
-        return self._in_work(lambda inverse, position, direction: inverse.apply(position + along * direction))
-
-    def _in_work(self, of: Callable[[RigidTransform, Floats, Floats], Floats]) -> Floats:
-        """Return `of` (M, 3) the transform into the workpiece frame and the poses, computed in blocks."""
         (position, direction), inverse = self.pose, self.program.placement.inverse()
-        made = np.empty_like(position)
-        for part in blocks(len(made), 1 << 15):
-            made[part] = of(inverse, position[part], direction[part])
-        return made
+        along = self.machine.tool_length - self.toolpath.tilt_centre
+        return OfSamples(len(position), lambda rows: inverse.apply(position[rows] + along * direction[rows]))
 
     @cached_property
     def match(self) -> PathMatch:
         """The matching of the samples with the toolpath. Needs a pose at every sample."""
-        return self.matched(self.tilt_centres)
+        return self.matched(self.tilt_centres[:])
 
     def matched(self, tilt_centres: Floats) -> PathMatch:
         """Return the matching of tilt centres (M, 3), with the axes of the samples, with the toolpath."""
         return match(
-            PosedPolyline(tilt_centres, self.axes),
+            PosedPolyline(tilt_centres, self.axes[:]),
             PosedPolyline(self.toolpath.tilt_centres, self.toolpath.axes),
             self.path_tolerance,
             axis_bound=self.specification.tilt + self.specification.axis_tolerance,

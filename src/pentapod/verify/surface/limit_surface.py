@@ -119,7 +119,7 @@ class LimitSurface:
         tip stays above the lowest point of the part, below which is what the part stands on. Nothing is known of its
         normals: those of the part stand for them.
         """
-        axes = replay.axes[np.asarray(KDTree(replay.tilt_centres).query(points)[1])]
+        axes = replay.axes[np.asarray(KDTree(replay.tilt_centres[:]).query(points)[1])]
         ways, lowest = (axes, normals), -np.inf
         if coverage.one_direction and _keeps_its_axis(replay):
             ways, lowest = (axes,), float((cutting.surface.mesh.vertices @ axes[0]).min())

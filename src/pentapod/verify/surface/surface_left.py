@@ -20,7 +20,7 @@ from pentapod.base.units import from_si
 from pentapod.geometry.polyline import arc_length
 from pentapod.geometry.solids import Solid
 from pentapod.mesh.patch import Patch
-from pentapod.numerics.blocks import in_blocks
+from pentapod.numerics.blocks import blocks
 from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
@@ -257,7 +257,9 @@ def _on_cuts(replay: Replay) -> Bools:
 
 def _nearest_sample(replay: Replay, point: Floats) -> int:
     """Return the sample whose tilt centre is nearest to a point (3,)."""
-    off = in_blocks(lambda centres: np.square(centres - point).sum(axis=1), replay.tilt_centres)
+    off = np.empty(len(replay.tilt_centres))
+    for part in blocks(len(off)):
+        off[part] = np.square(replay.tilt_centres[part] - point).sum(axis=1)
     return int(np.argmin(off))
 
 
