@@ -20,6 +20,7 @@ from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.proposal import propose
 from pentapod.machine.machine import Machine
 from pentapod.toolpath import SegmentKind
+from slotted_parts import slotted
 
 DESK = Machine.load("desk")
 
@@ -214,3 +215,28 @@ def test_a_proposed_job_plans(tmp_path, name):
     job, _ = proposed(tmp_path, SHAPES[name][0]())
     outcome = run(job, tmp_path / "out")
     assert outcome.passed, outcome.refusal or [c for c in outcome.verdict.certificates if not c.passed]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("width", "turn"), [(6.0, 0.0), (6.0, 31.0), (6.02, 0.0)])
+def test_a_slot_as_wide_as_the_ball_passes_at_once(width, turn, tmp_path):
+    """As most drawings ask for it. The surface of the ball's centres has no width there."""
+    job, _ = proposed(tmp_path, slotted(width, np.radians(turn)).apply_scale(1e3))
+    assert job.tool.diameter_mm == 6.0
+    outcome = run(job, tmp_path / "run", advice=None)
+    assert outcome.passed, str(outcome.verdict)
+
+
+def test_surface_behind_other_surface_does_not_count_for_the_side(tmp_path):
+    """Towers in rows: from the front all their faces are more than their roofs, but most are hidden."""
+    towers = [
+        trimesh.creation.box(bounds=[[x, y, 0.0], [x + 4.0, y + 4.0, 12.0]])
+        for x in range(0, 60, 8)
+        for y in range(0, 60, 8)
+    ]
+    job, _ = proposed(tmp_path, trimesh.util.concatenate(towers))
+    assert tuple(job.part.region_direction) == (0.0, 0.0, 1.0)
+    one = trimesh.creation.box(bounds=[[0.0, 0.0, 0.0], [60.0, 20.0, 20.0]])
+    one.apply_transform(trimesh.transformations.rotation_matrix(0.5 * np.pi, [0.0, 1.0, 0.0]))
+    job, _ = proposed(tmp_path, one)
+    assert job.part.region_direction[2] == 0.0

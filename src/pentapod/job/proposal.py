@@ -19,6 +19,7 @@ from pentapod.mesh.io.load import UNITS, load_mesh
 from pentapod.mesh.io.registry import states_unit
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
+from pentapod.mesh.query.heightfield import HeightField
 from pentapod.mesh.region import Region
 from pentapod.toolpath.strategies.waterline import WaterlineOptions
 
@@ -31,12 +32,13 @@ class ProposalOptions:
     work volume is taken. diameters: of cutters; the largest that is not wider than `cutter` of the part is taken.
     stepover: as a share of the diameter. steep_deg: slope from which surface counts as steep; waterlines where more
     than `steep` of it is, and less than `flat` of it is too flat for them. sideways: by how much more of the surface
-    another side must show than the top. backs: share of an open surface that may face the top where it is turned over.
-    margin: of a box above and below, as a share of the work volume's height. walls_deg, walls: slope from which surface
-    is an upright wall, and share of the region from which walls are machined in waterlines beside a raster, whose
-    passes leave those that are parallel to them. debris: largest share of an open surface that small bodies are left
-    out with; these are as small as a cutter may be. above_foot: share of the region below which a box above the foot is
-    no use, and flatter_deg: angles of the region of which the largest is taken then.
+    another side must show than the top; sides are alike from a share of `alike`. backs: share of an open surface that
+    may face the top where it is turned over. margin: of a box above and below, as a share of the work volume's height.
+    walls_deg, walls: slope from which surface is an upright wall, and share of the region from which walls are machined
+    in waterlines beside a raster, whose passes leave those that are parallel to them. debris: largest share of an open
+    surface that small bodies are left out with; these are as small as a cutter may be. above_foot: share of the region
+    below which a box above the foot is no use, and flatter_deg: angles of the region of which the largest is taken
+    then.
     """
 
     usual_mm: tuple[float, float] = (5.0, 2000.0)
@@ -49,6 +51,7 @@ class ProposalOptions:
     steep: float = 0.7
     flat: float = 0.01
     sideways: float = 1.2
+    alike: float = 0.99
     backs: float = 0.05
     walls_deg: float = 80.0
     walls: float = 0.001
@@ -201,7 +204,10 @@ def _side(mesh: Mesh) -> tuple[str, bool]:
     open_, most = not mesh.diagnosis.watertight, max(shown.values())
     if open_ and shown["-z"] == most and shown["+z"] < OPTIONS.backs * most:
         return "+z", True
-    best = max(shown, key=lambda name: shown[name])
+    if OPTIONS.sideways * shown["+z"] < most:  # what lies behind other surface was counted, too
+        shown = {name: HeightField(mesh, direction).front_area() for name, direction in _SIDES.items()}
+    most = max(shown.values())
+    best = next(name for name in shown if shown[name] >= OPTIONS.alike * most)
     return ("+z" if OPTIONS.sideways * shown["+z"] >= most else best), False
 
 

@@ -183,6 +183,15 @@ class Patch:
         """Return the part where a quantity of the normal, (..., 3) to (...), is not negative."""
         return self.trimmed(quantity(self.normals), normal_root(quantity, self.normals))
 
+    def spread(self, count: int) -> tuple[Floats, Floats]:
+        """Return about `count` points (N, 3) of the surface, evenly by area, and the normals of their facets."""
+        corners = self.vertices[self.faces]
+        rng, edges = np.random.default_rng(0), np.cumsum(self.areas)
+        facets = np.searchsorted(edges, (np.arange(count) + 0.5) * edges[-1] / count)
+        root, share = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
+        a, b, c = (corners[facets, k] for k in range(3))
+        return (1.0 - root) * a + root * (1.0 - share) * b + root * share * c, self.facet_normals[facets]
+
     def trimmed(self, values: Floats, root: Root) -> Patch:
         """Return the part where values (F, 3) at the corners of facets are not negative; root: where they are zero."""
         if (values >= 0.0).all():

@@ -18,6 +18,7 @@ from pentapod.toolpath.surfaces.ball_centres import smoothed
 from pentapod.toolpath.surfaces.drive_surface import DriveSurface
 from pentapod.toolpath.surfaces.options import DriveOptions, OverhangOptions
 from pentapod.toolpath.surfaces.part_surface import PartSurface
+from slotted_parts import slotted
 from toolpath_surfaces import grid
 
 R, CHORDAL, UP = 3e-3, 5e-6, np.array([0.0, 0.0, 1.0])
@@ -240,6 +241,48 @@ def test_no_more_than_a_ridge_is_left_at_the_foot_of_walls_that_are_not_machined
     places = nearest - (R - allowed) * towards
     missed = KDTree(centres).query(places)[0] > R
     assert missed.mean() < 1e-3
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.5])
+@pytest.mark.parametrize("play", [0.0, 0.05, 0.3])
+def test_a_slot_hardly_wider_than_the_ball_is_machined_at_its_bottom(play, turn):
+    """A slot as wide as the cutter is what most drawings ask for."""
+    mesh = part(slotted(6.0 + play, turn))
+    toolpath = make_toolpath(mesh, BallCutter(R), RasterOptions(stepover=3e-3))
+    lines = [s.tips + R * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT]
+    centres = dense(lines, 40)
+    assert gaps(mesh, centres[::20]).min() >= R - 1e-5 - 1e-6
+    along = np.linspace(-0.029, 0.029, 100)
+    bottom = np.stack([np.cos(turn) * along, np.sin(turn) * along, np.full(100, 10e-3 + R)], axis=1)
+    assert KDTree(centres).query(bottom)[0].max() < 0.6 * 3e-3
+
+
+def test_only_channels_with_parallel_walls_make_the_surface_nearer_to_the_part():
+    """A round groove of the ball's own radius does not, nor does a slot with more play, or one that it does not fit."""
+
+    def nearest(mesh):
+        surface = DriveSurface.of(mesh, R, UP)
+        return gaps(mesh, surface.mesh.vertices).min() / R
+
+    assert nearest(part(slotted(6.0))) == pytest.approx(0.97, abs=1e-3)
+    assert nearest(part(slotted(6.5))) > 0.999
+    assert nearest(part(slotted(5.9))) > 0.999
+    x = 0.5 * np.pi + np.linspace(-0.4 * np.pi, 0.4 * np.pi, 25)
+    groove = np.stack([R * np.cos(x), -R * np.sin(x)], axis=1)
+    assert nearest(sheet_along_x(groove)) > 0.995
+
+
+def sheet_along_x(profile):
+    """An open sheet over a profile (n, 2) in y and z, between flat shoulders."""
+    rim = profile[0, 1]
+    ends = np.array([[0.02, rim]])
+    line = np.concatenate([ends * [np.sign(profile[0, 0]), 1.0], profile, ends * [np.sign(profile[-1, 0]), 1.0]])
+    n = len(line)
+    corners = np.concatenate([np.c_[np.full(n, x), line] for x in (-0.02, 0.02)])
+    k = np.arange(n - 1)
+    faces = np.concatenate([np.c_[k, k + n, k + 1 + n], np.c_[k, k + 1 + n, k + 1]])
+    mesh = Mesh.of(corners, faces)
+    return mesh if mesh.facet_normals[:, 2].mean() > 0.0 else mesh.flipped()
 
 
 def test_the_ball_does_not_roll_around_an_open_border_but_bridges_a_small_hole():

@@ -23,7 +23,7 @@ from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.parts import Regions
 from pentapod.job.advice.settings import Tell, merged
 from pentapod.job.advice.trials import Trial
-from pentapod.job.build.left import foreseen, spread, uncovered
+from pentapod.job.build.left import foreseen, uncovered
 from pentapod.job.build.other_ways import NEARER, may_come_nearer
 from pentapod.job.build.specification import job_collision_world, job_coverage, job_cutting
 from pentapod.job.build.tool import job_tool
@@ -212,7 +212,7 @@ class FailedClaims:
         tool = job_tool(job, self.machine)
         if coverage.region is None or not isinstance(tool, BallEnded) or not len(coverage.region.faces):
             return 0.0
-        points, normals = spread(coverage.region, self.options.surface_points)
+        points, normals = coverage.region.spread(self.options.surface_points)
         above = points + coverage.left * normals
         return float(np.mean(uncovered(above, toolpath.tilt_centres, tool.radius, self.options.near_share)))
 

@@ -14,7 +14,6 @@ from pentapod.geometry.polyline import spaced
 from pentapod.job.build.region import rolls
 from pentapod.job.build.toolpath import Reports
 from pentapod.job.schema.job import Job
-from pentapod.mesh.patch import Patch
 from pentapod.toolpath.gouge.report import GougeReport
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify import Cutting
@@ -37,16 +36,6 @@ class LeftOptions:
     touches: float = 1e-6
 
 
-def spread(region: Patch, count: int) -> tuple[Floats, Floats]:
-    """Return about `count` points of a region, evenly by area, and the normals there."""
-    corners = region.vertices[region.faces]
-    rng, edges = np.random.default_rng(0), np.cumsum(region.areas)
-    facets = np.searchsorted(edges, (np.arange(count) + 0.5) * edges[-1] / count)
-    root, share = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
-    a, b, c = (corners[facets, k] for k in range(3))
-    return (1.0 - root) * a + root * (1.0 - share) * b + root * share * c, region.facet_normals[facets]
-
-
 def uncovered(points: Floats, path: Floats, radius: float, near: float) -> Bools:
     """Return above which points (N, 3) the centre of a ball never is within its radius, on its way along a path (M, 3).
 
@@ -65,7 +54,7 @@ def missed_by_drops(
     coverage, radius = cutting.coverage, cutting.cutter[0].rounding
     if coverage is None or coverage.region is None or not len(coverage.region.faces) or not len(dropped):
         return 0.0
-    points, normals = spread(coverage.region, options.points)
+    points, normals = coverage.region.spread(options.points)
     above = points + coverage.left * normals
     motions = np.concatenate([spaced(motion, options.near * radius) for motion in dropped])
     left = np.flatnonzero(np.asarray(KDTree(motions).query(above)[0]) <= radius)

@@ -17,12 +17,13 @@ from pentapod.mesh.mesh import Mesh
 class HeightGridOptions:
     """facets_per_cell: on average. most_entries: of facets in cells; a coarser grid is made where there were more.
 
-    sideways: metres to both sides of a point at which `hides` looks.
+    sideways: metres to both sides of a point at which `hides` looks. across: rays in each direction for areas.
     """
 
     facets_per_cell: float = 2.0
     most_entries: int = 20_000_000
     sideways: float = 1e-7
+    across: int = 200
 
 
 OPTIONS = HeightGridOptions()
@@ -91,6 +92,14 @@ class HeightField:
         height = points @ self.view + slack
         sides = (self._topmost(points + side, 1e-9)[0] for side in (sideways, -sideways))
         return np.logical_and(*(above > height for above in sides))
+
+    def front_area(self) -> float:
+        """Return about the area, square metres across the view, over which the mesh is seen from its front."""
+        x, y = (self._low[k] + (np.arange(OPTIONS.across) + 0.5) / OPTIONS.across * self._extent[k] for k in range(2))
+        points = np.stack([k.ravel() for k in np.meshgrid(x, y)], axis=1) @ self._frame[:2]
+        facets = self._topmost(points, 1e-9)[1]
+        front = self.mesh.facet_normals[facets[facets >= 0]] @ self.view > 0.0
+        return float(front.sum() / len(points) * self._extent.prod())
 
     def _topmost(self, points: Floats, margin: float) -> tuple[Floats, Ints, Floats]:
         """Return heights (N,) as `topmost`, the facets (N,) there, −1 for none, and the weights (N, 3) on them."""

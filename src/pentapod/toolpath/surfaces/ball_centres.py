@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pentapod.base.arrays import Bools, Floats
+from pentapod.base.arrays import Bools, Floats, row_lengths
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.runs import marked_runs
 from pentapod.mesh.normals import unit_or_zero
@@ -17,6 +17,9 @@ from pentapod.mesh.offset.offset_surface import onto_level
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.toolpath.surfaces.places import PlaceOptions, Places
+
+CANCELLED = 1e-6
+"""Share of its length, were all normals alike, up to which a sum of normals has no direction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +94,10 @@ def places(passes: Passes) -> tuple[Floats, Floats, Floats]:
 
 
 def smoothed(passes: Passes, window: float) -> Floats:
-    """Return unit normals (N, 3) of passes, averaged along each over `window` metres, less near its ends."""
+    """Return unit normals (N, 3) of passes, averaged along each over `window` metres, less near its ends.
+
+    Between walls that face each other they may cancel: there they stay.
+    """
     place, first, last = places(passes)
     half = np.minimum(0.5 * window, np.minimum(place - first, last - place))
     middles = 0.5 * (passes.normals[1:] + passes.normals[:-1]) * passes.steps[:, None]
@@ -100,4 +106,5 @@ def smoothed(passes: Passes, window: float) -> Floats:
         [np.interp(place + half, place, sums[:, k]) - np.interp(place - half, place, sums[:, k]) for k in range(3)],
         axis=1,
     )
-    return normalised(np.where(half[:, None] > 0.0, total, passes.normals))
+    known = row_lengths(total) > CANCELLED * half
+    return normalised(np.where(known[:, None], total, passes.normals))
