@@ -86,6 +86,7 @@ def test_limits_are_named_in_the_order_of_the_values(desk, crowd, place):
     tips, axes = poses(desk, 7)
     assert margins(tips, axes, place).shape == (7, len(listed))
     assert margins(tips.reshape(1, 7, 3), axes.reshape(1, 7, 3), place).shape == (1, 7, len(listed))
+    np.testing.assert_array_equal(margins(tips, axes, place, block=3), margins(tips, axes, place))
     assert contacts(margins.scene, tips[:0], axes[:0], place).margins.shape == (0, 14)
 
 

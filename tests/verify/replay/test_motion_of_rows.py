@@ -1,13 +1,16 @@
-"""The motion of the legs in blocks of rows, which the report draws, against one spline through all rows."""
+"""What is computed in blocks of rows: the motion of the legs that the report draws, and vectors of samples."""
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from replay_cases import good_case
 
 import pentapod.verify.replay.row_forces as rows
 from pentapod.geometry.interpolant import Interpolant
 from pentapod.report import signals
+from pentapod.verify.replay.replay import OfSamples
+from pentapod.verify.replay.row_forces import ROWS_AT_ONCE
 
 
 @pytest.mark.parametrize("interpolation", ["cubic", "linear"])
@@ -20,3 +23,13 @@ def test_the_motion_that_the_report_draws_is_that_of_one_spline(interpolation, b
     rates, accelerations = signals._motion(program)
     assert rates.tolist() == spline.first.tolist()
     assert accelerations.tolist() == spline.second.tolist()
+
+
+def test_vectors_of_samples_are_those_of_all_however_they_are_asked_for():
+    """Slices of many samples are computed in blocks."""
+    values = np.random.default_rng(0).normal(size=(2 * ROWS_AT_ONCE + 5, 3))
+    of = OfSamples(len(values), lambda rows: 2.0 * values[rows])
+    assert len(of) == len(values)
+    few = np.array([7, 1, len(values) - 1])
+    for rows in (slice(None), slice(3, None, 2), slice(10, 20), slice(len(values), None), few, 4, -1):
+        np.testing.assert_array_equal(of[rows], 2.0 * values[rows])

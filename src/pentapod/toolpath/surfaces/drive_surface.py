@@ -74,14 +74,14 @@ class DriveSurface(RolledSurface):
         """
         options = options or DriveOptions()
         window = None if region is None else _window(part, radius, view, options, region)
-        asked = b"" if window is None else window.box.tobytes() + window.view.tobytes()
+        asked = view.tobytes() if window is None else window.box.tobytes() + window.view.tobytes()
         key = radius, options.step, options.parts, asked
         known = _KNOWN.setdefault(part, {})
         found = known.pop(key, None)  # put back as the last one: others are forgotten first
         if found is None:
             tree = FacetTree.of(part)
-            near = _has_tight_channels(part, tree, radius, view, options, region)
-            distance = (1.0 - options.nearer) * radius if near else radius
+            tight = _has_tight_channels(part, tree, radius, view, options, region)
+            distance = (1.0 - options.nearer) * radius if tight else radius
             vertices, faces = offset_surface(tree, distance, options.step * distance, options.parts, window)
             # A line goes on over creases of the drive surface: no edge of it parts passes.
             mesh = Mesh.of(vertices, faces, source=part.diagnosis.source, crease_angle=np.pi)
