@@ -28,8 +28,8 @@ def test_the_motion_that_the_report_draws_is_that_of_one_spline(interpolation, b
 def test_vectors_of_samples_are_those_of_all_however_they_are_asked_for():
     """Slices of many samples are computed in blocks."""
     values = np.random.default_rng(0).normal(size=(2 * ROWS_AT_ONCE + 5, 3))
-    of = OfSamples(len(values), lambda rows: 2.0 * values[rows])
+    of = OfSamples(len(values), lambda asked: 2.0 * values[asked])
     assert len(of) == len(values)
     few = np.array([7, 1, len(values) - 1])
-    for rows in (slice(None), slice(3, None, 2), slice(10, 20), slice(len(values), None), few, 4, -1):
-        np.testing.assert_array_equal(of[rows], 2.0 * values[rows])
+    for asked in (slice(None), slice(3, None, 2), slice(10, 20), slice(len(values), None), few, 4, -1):
+        np.testing.assert_array_equal(of[asked], 2.0 * values[asked])
