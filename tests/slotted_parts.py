@@ -4,11 +4,15 @@ import numpy as np
 import trimesh
 
 
-def slotted(width, turn=0.0, depth=5.0):
-    """A block of 60 × 40 × 15 mm with a slot along x in the middle of its top, turned about z."""
+def slotted(width, turn=0.0, depth=5.0, below=0.0):
+    """A block of 60 × 40 × 15 mm with a slot along x in the middle of its top, turned about z.
+
+    below: by how much each side of the slot is farther out at its bottom.
+    """
     half, bottom = 0.5 * width, 15.0 - depth
+    foot = half + below
     profile = np.array(
-        [(-20, 0), (20, 0), (20, 15), (half, 15), (half, bottom), (-half, bottom), (-half, 15), (-20, 15)]
+        [(-20, 0), (20, 0), (20, 15), (half, 15), (foot, bottom), (-foot, bottom), (-half, 15), (-20, 15)]
     )
     corners = np.concatenate([np.c_[np.full(8, x), profile] for x in (-30.0, 30.0)])
     ends = np.array([(0, 1, 4), (0, 4, 5), (1, 2, 3), (1, 3, 4), (0, 5, 6), (0, 6, 7)])

@@ -223,6 +223,9 @@ def test_a_region_that_ends_at_the_foot_of_walls_ends_in_a_corner_there(pocket):
     assert around == pytest.approx(2.0 * (18e-3 + 10e-3), rel=0.05)
     assert pocket.feet(patch).sum() == len(sides)
     assert not pocket.feet(pocket.patch(Region(angle=np.radians(90.0)))).any()
+    for angle, below, some in ((50.0, 0.0, True), (50.0, 0.4, False), (90.0, 0.4, False)):
+        wide = DriveSurface.of(part(slotted(14.0, below=below)), R, UP)
+        assert wide.feet(wide.patch(Region(angle=np.radians(angle)))).any() == some
 
 
 @pytest.mark.parametrize("degrees", [50.0, 80.0])
