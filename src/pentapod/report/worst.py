@@ -13,9 +13,7 @@ from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
 from pentapod.report.signals import Signals
 from pentapod.report.words import number
-
-ROWS_AT_ONCE = 1 << 15
-"""Rows that are looked at together, to bound the memory."""
+from pentapod.verify.replay.row_forces import ROWS_AT_ONCE
 
 FULL_FEED = 0.98
 """Share of the programmed feed from which a cut counts as running at full feed."""

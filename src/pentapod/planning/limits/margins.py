@@ -102,10 +102,11 @@ class Margins:
         poses at a time, to bound the memory.
         """
         if tips.ndim == 2 and len(tips) > block:
-            parts = blocks(len(tips), block)
-            known = (None if gaps is None else gaps[part] for part in blocks(len(tips), block))
             return np.concatenate(
-                [self(tips[part], axes[part], placement, own) for part, own in zip(parts, known, strict=True)]
+                [
+                    self(tips[part], axes[part], placement, None if gaps is None else gaps[part])
+                    for part in blocks(len(tips), block)
+                ]
             )
         own = self.own(tips, axes)
         if not self.scene.collision_world.obstacles:

@@ -63,10 +63,9 @@ def crease_lines(
         vertices = [v for _, v in chain]
         vertices.append(other_end(edges, *chain[-1]))
         known = np.flatnonzero(normals[vertices].any(axis=1))
-        if len(known):  # between walls that face each other normals cancel: those beside count
-            at = np.arange(len(vertices))
-            own = np.stack([np.interp(at, known, normals[vertices][known, k]) for k in range(3)], axis=1)
-            lines.append((patch.vertices[vertices], unit_or_zero(own)))
+        if len(known):  # between walls that face each other normals cancel: the nearest one on the line counts
+            nearest = known[np.abs(np.arange(len(vertices))[:, None] - known).argmin(axis=1)]
+            lines.append((patch.vertices[vertices], normals[vertices][nearest]))
     sides = patch.vertices[edges[chosen, 1]] - patch.vertices[edges[chosen, 0]]
     longest = options.join * float(np.median(np.linalg.norm(sides, axis=1))) if len(sides) else 0.0
     lines = joined_ends(lines, longest, options.corner, options.same * longest)

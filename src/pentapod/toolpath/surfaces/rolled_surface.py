@@ -85,7 +85,7 @@ class RolledSurface(ABC):
         return np.zeros(0, dtype=np.intp)
 
     def feet(self, patch: Patch) -> Bools:
-        """Return which edges (E,) of a patch are borders along which a pass must run: none unless known."""
+        """Return which edges (E,) of a patch are borders along which a pass must run: here none."""
         return np.zeros(len(patch.topology.edges), dtype=np.bool_)
 
     @property

@@ -16,9 +16,7 @@ from pentapod.toolpath.toolpath import SegmentKind
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.gouge_bounds import GougeBound, gouge_bound
 from pentapod.verify.replay.replay import Replay
-
-CHORDS_AT_ONCE = 1 << 15
-"""Chords that are looked at together, to bound the memory."""
+from pentapod.verify.replay.row_forces import ROWS_AT_ONCE
 
 THICKNESS_SHARE = 0.9
 """Share of the cutter's thickness: deeper gouges are judged on the cutter raised along its axis."""
@@ -73,7 +71,7 @@ def rapid_chords(replay: Replay) -> Bools:
     other = np.array([segment.kind is not SegmentKind.RAPID for segment in toolpath.segments])
     before = np.concatenate([[0], np.cumsum(other)])
     found = np.empty(len(arcs) - 1, dtype=np.bool_)
-    for part in blocks(len(found), CHORDS_AT_ONCE):
+    for part in blocks(len(found), ROWS_AT_ONCE):
         first = np.searchsorted(ends[1:], arcs[part] - replay.match_radius, side="left")
         last = arcs[part.start + 1 : part.stop + 1] + replay.match_radius
         behind = np.minimum(np.searchsorted(ends, last, side="right"), len(other))
