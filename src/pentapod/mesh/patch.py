@@ -184,13 +184,16 @@ class Patch:
         return self.trimmed(quantity(self.normals), normal_root(quantity, self.normals))
 
     def spread(self, count: int) -> tuple[Floats, Floats]:
-        """Return about `count` points (N, 3) of the surface, evenly by area, and the normals of their facets."""
-        corners = self.vertices[self.faces]
-        rng, edges = np.random.default_rng(0), np.cumsum(self.areas)
+        """Return points (count, 3) evenly by area over the surface, and the normals (count, 3) of their facets."""
+        edges = np.cumsum(self.areas)
         facets = np.searchsorted(edges, (np.arange(count) + 0.5) * edges[-1] / count)
-        root, share = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
-        a, b, c = (corners[facets, k] for k in range(3))
-        return (1.0 - root) * a + root * (1.0 - share) * b + root * share * c, self.facet_normals[facets]
+        # Kronecker's sequence of the plastic number: pairs that fill the unit square evenly.
+        pairs = np.mod((np.arange(count)[:, None] + 1.0) * [0.7548776662466927, 0.5698402909980532], 1.0)
+        over = pairs.sum(axis=1) > 1.0
+        pairs[over] = 1.0 - pairs[over]
+        corners = self.vertices[self.faces[facets]]
+        points = corners[:, 0] + (pairs[:, :, None] * (corners[:, 1:] - corners[:, :1])).sum(axis=1)
+        return points, np.ascontiguousarray(self.facet_normals[facets])
 
     def trimmed(self, values: Floats, root: Root) -> Patch:
         """Return the part where values (F, 3) at the corners of facets are not negative; root: where they are zero."""

@@ -21,13 +21,13 @@ from pentapod.mesh.normals import unit_or_zero
 from pentapod.mesh.offset.offset_surface import Window, offset_surface
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
-from pentapod.mesh.query.heightfield import HeightField
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.mesh.region import Region
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.surfaces.ball_centres import BallCentres, smoothed
 from pentapod.toolpath.surfaces.options import DriveOptions
 from pentapod.toolpath.surfaces.rolled_surface import RolledSurface
+from pentapod.toolpath.surfaces.tight_channels import has_tight_channels
 
 _KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, float, int, bytes], tuple[FacetTree, Mesh]]] = WeakKeyDictionary()
 """Drive surfaces of parts that are in use: planning, the verdict and changes of a job need the same."""
@@ -80,8 +80,8 @@ class DriveSurface(RolledSurface):
         found = known.pop(key, None)  # put back as the last one: others are forgotten first
         if found is None:
             tree = FacetTree.of(part)
-            tight = _has_tight_channels(part, tree, radius, view, options, region)
-            distance = (1.0 - options.nearer) * radius if tight else radius
+            tight = has_tight_channels(part, tree, radius, view, options.channels, region)
+            distance = (1.0 - options.channels.nearer) * radius if tight else radius
             vertices, faces = offset_surface(tree, distance, options.step * distance, options.parts, window)
             # A line goes on over creases of the drive surface: no edge of it parts passes.
             mesh = Mesh.of(vertices, faces, source=part.diagnosis.source, crease_angle=np.pi)
@@ -210,32 +210,6 @@ class DriveSurface(RolledSurface):
         gap, away, facet = self.centres.tree.closest(points)
         upright = np.einsum("ni,ni->n", self.part.facet_normals[self.centres.tree.facets[facet]], away)
         return points - away, np.sqrt(np.maximum(gap**2 - upright**2, 0.0))
-
-
-def _has_tight_channels(
-    part: Mesh, tree: FacetTree, radius: float, view: Floats, options: DriveOptions, region: Region | None
-) -> bool:
-    """Return whether a part has channels hardly wider than the ball, such as a slot as wide as the cutter.
-
-    There the ball fits at its radius above the surface, and hardly farther away it touches the wall opposite. What the
-    part hides does not count: among it are surfaces inside of parts that are made of several bodies.
-    """
-    whole = Patch.whole(part)
-    patch = whole if region is None or region.box is None else whole.in_box(region)
-    area = float(patch.areas.sum())
-    if not area > 0.0:
-        return False
-    count = min(int(options.samples * area / radius**2) + 1, options.most)
-    points, normals = patch.spread(count)
-    fits = ~tree.within(points + radius * normals, (1.0 - options.fits) * radius)
-    points, normals = points[fits], normals[fits]
-    gap, away, _ = tree.closest(points + (1.0 + options.play) * radius * normals, radius)
-    opposite = -np.einsum("ni,ni->n", away, normals)
-    tight = np.flatnonzero((gap < radius) & (opposite > np.cos(options.parallel) * gap))
-    if len(tight) <= options.tight * count:
-        return False
-    hidden = HeightField(part, view).hides((points + radius * normals)[tight], options.border * radius)
-    return len(tight) - int(hidden.sum()) > options.tight * count
 
 
 def _distance(centres: Floats, points: Floats, most: float) -> Floats:

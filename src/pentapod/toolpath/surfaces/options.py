@@ -33,36 +33,45 @@ class OverhangOptions(Value):
 
 
 @dataclass(frozen=True)
+class ChannelOptions(Value):
+    """Which channels are tight, and what is done then.
+
+    play: of the ball, below which a channel is tight; fits: what the ball may lack, since meshes are rounded; parallel:
+    angle between the walls, radians. samples: points of the part for the square of a radius that are looked at, at most
+    `most`; share: of them, from which the part has such channels. above: height, a share, by which the part must be
+    above a point to hide it. nearer: by how much nearer to the part the drive surface is made then.
+    """
+
+    play: float = 0.047
+    fits: float = 1e-3
+    parallel: float = float(np.radians(5.0))
+    samples: float = 4.0
+    most: int = 40_000
+    share: float = 5e-4
+    above: float = 0.02
+    nearer: float = 0.03
+
+
+@dataclass(frozen=True)
 class DriveOptions(Value):
     """How the surface is made, and where it and a region of it end.
 
     step: of the grid, a share. parts: how many times finer it is in channels between its nodes; narrower ones may be
-    closed. play, fits: channels around the ball with less play than `play` are looked for, and those in which it lacks
-    less than `fits`, between walls that are parallel but for the angle `parallel`, radians; nearer: by how much nearer
-    to the part the surface is made where more than `tight` of the part's area is in such channels: they would be
-    closed. samples: points that tell, for the square of a radius; at most `most`. border: how exactly an open border is
-    known, a share; enters: how far beyond it the ball gets where it is no hole. rolls: how far beyond it the ball goes
-    about hollows, within `about_hollows`, that it cuts only so: points at a height `hollow` above the part tell.
-    around: longest link around what is in the way, as a multiple of the straight way and twice the clearance. evened:
-    how often the stepover for a scallop is averaged with that of neighbouring facets, whose curvature is noisy. about:
-    how far beyond what the ball touches in a region's box the surface is made, as a multiple of the radius: links may
-    lead there. region_ends: cosines by which a normal is off the limit of a region where that may end; crease: angle
-    between exact and mean normals, radians, from which there are two; halvings: of an edge, to find where the region
-    ends on it. wall: cosine to a region's direction below which a facet is one of a wall; foot: cosine by which the
-    foot of one is within the region. steep: angle to the axis, radians, from which a face has a foot; rising: least
-    rise of a facet over it, as a share of its height. overhangs: what hides a point. places: how they are moved onto
-    the surface.
+    closed. border: how exactly an open border is known, a share; enters: how far beyond it the ball gets where it is no
+    hole. rolls: how far beyond it the ball goes about hollows, within `about_hollows`, that it cuts only so: points at
+    a height `hollow` above the part tell. around: longest link around what is in the way, as a multiple of the straight
+    way and twice the clearance. evened: how often the stepover for a scallop is averaged with that of neighbouring
+    facets, whose curvature is noisy. about: how far beyond what the ball touches in a region's box the surface is made,
+    as a multiple of the radius: links may lead there. region_ends: cosines by which a normal is off the limit of a
+    region where that may end; crease: angle between exact and mean normals, radians, from which there are two;
+    halvings: of an edge, to find where the region ends on it. wall: cosine to a region's direction below which a facet
+    is one of a wall; foot: cosine by which the foot of one is within the region. steep: angle to the axis, radians,
+    from which a face has a foot; rising: least rise of a facet over it, as a share of its height. overhangs: what hides
+    a point. channels: in which it would be closed. places: how they are moved onto the surface.
     """
 
     step: float = 0.25
     parts: int = 8
-    play: float = 0.047
-    fits: float = 1e-3
-    nearer: float = 0.03
-    parallel: float = float(np.radians(5.0))
-    tight: float = 5e-4
-    samples: float = 4.0
-    most: int = 40_000
     border: float = 0.02
     enters: float = 0.5
     rolls: float = 0.3
@@ -79,4 +88,5 @@ class DriveOptions(Value):
     steep: float = 0.25 * np.pi
     rising: float = 0.5
     overhangs: OverhangOptions = field(default_factory=OverhangOptions)
+    channels: ChannelOptions = field(default_factory=ChannelOptions)
     places: PlaceOptions = field(default_factory=PlaceOptions)
