@@ -17,7 +17,7 @@ from pentapod.job.build.reach import check_reach
 from pentapod.job.build.region import region_report
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
-from pentapod.job.proposal import propose
+from pentapod.job.proposal.proposal import propose
 from pentapod.machine.machine import Machine
 from pentapod.toolpath import SegmentKind
 from slotted_parts import slotted

@@ -56,7 +56,7 @@ def _for_part(part: Path, job: Path, machine: str, *, as_json: bool, quiet: bool
     """Write a job for a part."""
     from pentapod.base.errors import InputError
     from pentapod.base.files import atomic_write
-    from pentapod.job.proposal import propose
+    from pentapod.job.proposal.proposal import propose
     from pentapod.machine.machine import Machine
 
     if job.exists():

@@ -13,6 +13,8 @@ from pentapod.base.errors import MeshError
 from pentapod.base.units import from_si, to_si
 from pentapod.base.values import Value
 from pentapod.geometry.directions import tangent_frame
+from pentapod.job.proposal.cutter import foot_key, rounded, tool_for
+from pentapod.job.proposal.options import OPTIONS
 from pentapod.machine.machine import Machine
 from pentapod.machine.parts import WorkVolume
 from pentapod.mesh.io.load import UNITS, load_mesh
@@ -23,44 +25,6 @@ from pentapod.mesh.query.heightfield import HeightField
 from pentapod.mesh.region import Region
 from pentapod.toolpath.strategies.waterline import WaterlineOptions
 
-
-@dataclass(frozen=True)
-class ProposalOptions:
-    """What is proposed. Lengths in mm, angles in degrees.
-
-    usual_mm: largest extents for which the unit mm is believed; else the unit whose part is nearest to the size of the
-    work volume is taken. diameters: of cutters; the largest that is not wider than `cutter` of the part is taken.
-    stepover: as a share of the diameter. steep_deg: slope from which surface counts as steep; waterlines where more
-    than `steep` of it is, and less than `flat` of it is too flat for them. sideways: by how much more of the surface
-    another side must show than the top; sides are alike from a share of `alike`. backs: share of an open surface that
-    may face the top where it is turned over. margin: of a box above and below, as a share of the work volume's height.
-    walls_deg, walls: slope from which surface is an upright wall, and share of the region from which walls are machined
-    in waterlines beside a raster, whose passes leave those that are parallel to them. debris: largest share of an open
-    surface that small bodies are left out with; these are as small as a cutter may be. above_foot: share of the region
-    below which a box above the foot is no use, and flatter_deg: angles of the region of which the largest is taken
-    then.
-    """
-
-    usual_mm: tuple[float, float] = (5.0, 2000.0)
-    diameters: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0)
-    cutter: float = 0.1
-    stepover: float = 0.5
-    feed_mm_min: float = 1500.0
-    steep_deg: float = 60.0
-    margin: float = 0.001
-    steep: float = 0.7
-    flat: float = 0.01
-    sideways: float = 1.2
-    alike: float = 0.99
-    backs: float = 0.05
-    walls_deg: float = 80.0
-    walls: float = 0.001
-    debris: float = 0.02
-    above_foot: float = 0.5
-    flatter_deg: tuple[float, ...] = (80.0, 70.0, 60.0, 50.0, 40.0, 30.0, 20.0, 10.0)
-
-
-OPTIONS = ProposalOptions()
 _SIDES = {
     f"{sign}{axis}": np.array([float(axis == other) for other in "xyz"]) * (1.0 if sign == "+" else -1.0)
     for sign in "+-"
@@ -105,7 +69,7 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
     remarks.append(f"machined from {side}")
     box = _box(mesh, direction, machine.work)
     if box is not None:
-        table["region_box_mm"] = [[_rounded(v) for v in corner] for corner in from_si(box, "mm")]
+        table["region_box_mm"] = [[rounded(v) for v in corner] for corner in from_si(box, "mm")]
         reasons["part", "region_box_mm"] = "the part is larger than the machine's work volume; this is its middle"
     region = Region(box=box, direction=direction)
     patch = Patch.of(mesh, replace(region, angle=0.5 * np.pi))
@@ -116,9 +80,9 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
             "it is larger than the work volume: a box in its middle is machined (region_box_mm), "
             f"{100.0 * float(patch.areas.sum() / mesh.facet_areas.sum()):.2g} % of the surface"
         )
-    toolpath, tool = _toolpath(patch, direction), _tool(patch, direction)
-    toolpath = {**toolpath, "stepover_mm": _rounded(OPTIONS.stepover * tool["diameter_mm"])}
-    foot = _foot(mesh, patch, direction, tool) if box is None else None
+    toolpath, tool = _toolpath(patch, direction), tool_for(patch, direction)
+    toolpath = {**toolpath, "stepover_mm": rounded(OPTIONS.stepover * tool["diameter_mm"])}
+    foot = foot_key(mesh, patch, direction, tool) if box is None else None
     if foot is not None:
         key, table[key], reasons["part", key], remark = foot
         remarks.append(remark)
@@ -174,7 +138,7 @@ def _without_debris(
     """Return an open surface without bodies as small as debris, and what to say; the key for it goes into [part]."""
     if mesh.diagnosis.watertight:
         return mesh, ()
-    least = _rounded(from_si(OPTIONS.cutter * max(mesh.diagnosis.extents), "mm"))
+    least = rounded(from_si(OPTIONS.cutter * max(mesh.diagnosis.extents), "mm"))
     small = mesh.small_bodies(float(to_si(least, "mm")))
     share = float(mesh.facet_areas[small].sum() / mesh.facet_areas.sum())
     if not 0.0 < share < OPTIONS.debris:
@@ -229,14 +193,6 @@ def _box(mesh: Mesh, direction: Floats, work: WorkVolume) -> Floats | None:
     return np.sort(corners, axis=0)
 
 
-def _tool(patch: Patch, direction: Floats) -> dict[str, Any]:
-    """Return the cutter for a region: a ball of a share of its size."""
-    points = patch.vertices[np.unique(patch.faces)] @ np.stack(tangent_frame(direction)).T
-    widest = float(from_si(np.ptp(points, axis=0).max(), "mm"))
-    fitting = [size for size in OPTIONS.diameters if size <= OPTIONS.cutter * widest]
-    return {"type": "ball", "diameter_mm": max(fitting, default=OPTIONS.diameters[0])}
-
-
 def _toolpath(patch: Patch, direction: Floats) -> dict[str, Any]:
     """Return the strategy for a region: waterlines where it is steep all over, else a raster along its longer side."""
     upright, whole = patch.facet_normals @ direction, float(patch.areas.sum())
@@ -254,65 +210,10 @@ def _walls(patch: Patch, direction: Floats) -> float:
     return float(patch.areas[upright].sum() / patch.areas.sum())
 
 
-def _foot(mesh: Mesh, patch: Patch, direction: Floats, tool: dict[str, Any]) -> tuple[str, Any, str, str] | None:
-    """Return the key of [part] that keeps the ball above the foot of a solid, its value, why, and a remark; or None."""
-    radius = 0.5 * float(to_si(tool["diameter_mm"], "mm"))
-    steep = patch.facet_normals @ direction < np.cos(to_si(OPTIONS.steep_deg, "deg"))
-    if not mesh.diagnosis.watertight or _heights(mesh, patch, direction)[steep].min(initial=np.inf) >= radius:
-        return None
-    if (above := _above_the_foot(mesh, patch, direction, radius)) is not None:
-        value = [[_rounded(v) for v in corner] for corner in from_si(above, "mm")]
-        why = "lower down the ball would reach below the part; leave it out on a riser"
-        low = _rounded(0.5 * tool["diameter_mm"])
-        remark = f"the lowest {low:g} mm are left: the ball would reach into the table (region_box_mm)"
-        return "region_box_mm", value, why, remark
-    if (angle := _flatter(mesh, patch, direction, radius)) is not None:
-        why = "at steeper places the ball would reach below this thin part"
-        remark = f"only where it is flatter than {angle:g} deg: at steeper places the ball would reach into the table"
-        return "region_angle_deg", angle, why, f"{remark} (region_angle_deg)"
-    return None
-
-
-def _heights(mesh: Mesh, patch: Patch, direction: Floats) -> Floats:
-    """Return how high (F,) the lowest corner of each facet of a region is above the foot of the part, metres."""
-    heights: Floats = (patch.vertices @ direction)[patch.faces].min(axis=1)
-    return heights - float((mesh.vertices @ direction).min())
-
-
-def _above_the_foot(mesh: Mesh, patch: Patch, direction: Floats, radius: float) -> Floats | None:
-    """Return the box (2, 3) of a solid without its lowest ball radius; None where it would leave out most of it."""
-    seen = patch.areas * np.maximum(patch.facet_normals @ direction, 0.0)
-    if seen[_heights(mesh, patch, direction) >= radius].sum() < OPTIONS.above_foot * seen.sum():
-        return None
-    frame = np.stack([*tangent_frame(direction), direction])
-    points, margin = mesh.vertices @ frame.T, radius
-    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
-    low[2] += margin + radius
-    return np.sort(np.array([low, high]) @ frame, axis=0)
-
-
-def _flatter(mesh: Mesh, patch: Patch, direction: Floats, radius: float) -> float | None:
-    """Return the largest angle of the region, degrees, at which the ball stays above the foot of a part; or None."""
-    heights = _heights(mesh, patch, direction)
-    upright = patch.facet_normals @ direction
-    for angle in OPTIONS.flatter_deg:
-        least = np.cos(to_si(angle, "deg"))
-        inside = upright >= least
-        # The ball's lowest point is below its contact by r (1 - cos).
-        if inside.any() and heights[inside].min() >= radius * (1.0 - least):
-            return angle
-    return None
-
-
 def _placement(mesh: Mesh, patch: Patch, direction: Floats, work: WorkVolume) -> dict[str, Any]:
     """Return the placement on a table at the height that brings the region to the middle of the work volume."""
     heights = patch.vertices[np.unique(patch.faces)] @ direction
     above = 0.5 * float(heights.min() + heights.max()) - float((mesh.vertices @ direction).min())
     towards_base = -1.0 if work.centre[2] > 0.0 else 1.0
-    table = {"mode": "table", "table_z_mm": _rounded(from_si(work.centre[2] - towards_base * above, "mm"))}
+    table = {"mode": "table", "table_z_mm": rounded(from_si(work.centre[2] - towards_base * above, "mm"))}
     return table | ({} if direction[2] == 1.0 else {"up": [float(v) + 0.0 for v in direction]})
-
-
-def _rounded(value: float) -> float:
-    """Return a length in mm with at most two digits after the point."""
-    return round(float(value), 2) + 0.0

@@ -1,0 +1,1 @@
+"""Proposal: a job for a part, from its size and shape."""
