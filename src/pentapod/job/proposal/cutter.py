@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,62 +15,102 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
 
 
-def tool_for(patch: Patch, direction: Floats) -> dict[str, Any]:
-    """Return the cutter for a region: a ball of a share of its size."""
+@dataclass(frozen=True)
+class Cutter:
+    """A ball for a region. why: it is not the usual one, or empty. foot: what keeps it above the foot of the part."""
+
+    diameter_mm: float
+    why: str = ""
+    foot: Foot | None = None
+
+
+@dataclass(frozen=True)
+class Foot:
+    """A key of [part], its value, why, and a sentence to print. keeps: share of the area."""
+
+    key: str
+    value: Any
+    why: str
+    remark: str
+    keeps: float
+
+
+def cutter_for(mesh: Mesh, patch: Patch, direction: Floats, *, stands: bool) -> Cutter:
+    """Return the cutter for a region: a ball of a share of its size, smaller ones where that reaches below most of it.
+
+    stands: whether the whole part stands on the table, so that its foot counts.
+    """
+    usual = _usual(patch, direction)
+    if not stands or not mesh.diagnosis.watertight:
+        return Cutter(usual)
+    feet = _Feet(mesh, patch, direction)
+    sizes = [size for size in OPTIONS.diameters if OPTIONS.smaller * usual <= size <= usual]
+    others: list[tuple[float, Cutter]] = []
+    for size in reversed(sizes):
+        why = "" if size == usual else "a larger ball would reach below most of this part"
+        radius = 0.5 * float(to_si(size, "mm"))
+        if feet.clear(radius):
+            return Cutter(size, why)
+        for foot in (feet.above(radius), feet.flatter(radius)):
+            if foot is not None and foot.keeps >= OPTIONS.above_foot:
+                return Cutter(size, why, foot)
+            if foot is not None:
+                others.append((foot.keeps, Cutter(size, why, foot)))
+    keeps, best = max(others, key=lambda other: other[0])
+    return best if keeps > 0.0 else Cutter(usual)
+
+
+def _usual(patch: Patch, direction: Floats) -> float:
+    """Return the usual diameter of a ball for a region, mm."""
     points = patch.vertices[np.unique(patch.faces)] @ np.stack(tangent_frame(direction)).T
-    widest = float(from_si(np.ptp(points, axis=0).max(), "mm"))
-    fitting = [size for size in OPTIONS.diameters if size <= OPTIONS.cutter * widest]
-    return {"type": "ball", "diameter_mm": max(fitting, default=OPTIONS.diameters[0])}
+    least, most = np.sort(from_si(np.ptp(points, axis=0), "mm"))
+    largest = min(OPTIONS.cutter * most, OPTIONS.narrow * least)
+    return max((size for size in OPTIONS.diameters if size <= largest), default=OPTIONS.diameters[0])
 
 
-def foot_key(mesh: Mesh, patch: Patch, direction: Floats, tool: dict[str, Any]) -> tuple[str, Any, str, str] | None:
-    """Return the key of [part] that keeps the ball above the foot of a solid, its value, why, and a remark; or None."""
-    radius = 0.5 * float(to_si(tool["diameter_mm"], "mm"))
-    steep = patch.facet_normals @ direction < np.cos(to_si(OPTIONS.steep_deg, "deg"))
-    if not mesh.diagnosis.watertight or _heights(mesh, patch, direction)[steep].min(initial=np.inf) >= radius:
-        return None
-    if (above := _above_the_foot(mesh, patch, direction, radius)) is not None:
-        value = [[rounded(v) for v in corner] for corner in from_si(above, "mm")]
+class _Feet:
+    """How high the facets of a region are above the foot of a solid, metres; areas, and those seen, as shares."""
+
+    def __init__(self, mesh: Mesh, patch: Patch, direction: Floats) -> None:
+        self.mesh, self.direction = mesh, direction
+        self.upright = patch.facet_normals @ direction
+        self.heights = (patch.vertices @ direction)[patch.faces].min(axis=1) - float((mesh.vertices @ direction).min())
+        self.areas = patch.areas / patch.areas.sum()
+        seen = self.areas * np.maximum(self.upright, 0.0)
+        self.seen = seen / seen.sum()
+
+    def clear(self, radius: float) -> bool:
+        """Return whether a ball stays above the foot at all steep places."""
+        steep = self.upright < np.cos(to_si(OPTIONS.steep_deg, "deg"))
+        return bool(self.heights[steep].min(initial=np.inf) >= radius)
+
+    def above(self, radius: float) -> Foot:
+        """Return the box of the part without its lowest ball radius."""
+        frame = np.stack([*tangent_frame(self.direction), self.direction])
+        points = self.mesh.vertices @ frame.T
+        low, high = points.min(axis=0) - radius, points.max(axis=0) + radius
+        low[2] += 2.0 * radius
+        box = np.sort(np.array([low, high]) @ frame, axis=0)
+        value = [[rounded(v) for v in corner] for corner in from_si(box, "mm")]
         why = "lower down the ball would reach below the part; leave it out on a riser"
-        low = rounded(0.5 * tool["diameter_mm"])
-        remark = f"the lowest {low:g} mm are left: the ball would reach into the table (region_box_mm)"
-        return "region_box_mm", value, why, remark
-    if (angle := _flatter(mesh, patch, direction, radius)) is not None:
-        why = "at steeper places the ball would reach below this thin part"
-        remark = f"only where it is flatter than {angle:g} deg: at steeper places the ball would reach into the table"
-        return "region_angle_deg", angle, why, f"{remark} (region_angle_deg)"
-    return None
+        left = rounded(float(from_si(radius, "mm")))
+        remark = f"the lowest {left:g} mm are left: the ball would reach into the table (region_box_mm)"
+        return Foot("region_box_mm", value, why, remark, float(self.seen[self.heights >= radius].sum()))
 
-
-def _heights(mesh: Mesh, patch: Patch, direction: Floats) -> Floats:
-    """Return how high (F,) the lowest corner of each facet of a region is above the foot of the part, metres."""
-    heights: Floats = (patch.vertices @ direction)[patch.faces].min(axis=1)
-    return heights - float((mesh.vertices @ direction).min())
-
-
-def _above_the_foot(mesh: Mesh, patch: Patch, direction: Floats, radius: float) -> Floats | None:
-    """Return the box (2, 3) of a solid without its lowest ball radius; None where it would leave out most of it."""
-    seen = patch.areas * np.maximum(patch.facet_normals @ direction, 0.0)
-    if seen[_heights(mesh, patch, direction) >= radius].sum() < OPTIONS.above_foot * seen.sum():
+    def flatter(self, radius: float) -> Foot | None:
+        """Return the largest angle of the region at which a ball stays above the foot; None if there is none."""
+        for angle in OPTIONS.flatter_deg:
+            least = np.cos(to_si(angle, "deg"))
+            inside = self.upright >= least
+            # The ball's lowest point is below its contact by r (1 - cos).
+            if inside.any() and self.heights[inside].min() >= radius * (1.0 - least):
+                why = "at steeper places the ball would reach below this thin part"
+                remark = (
+                    f"only where it is flatter than {angle:g} deg: at steeper places the ball would reach into the "
+                    "table (region_angle_deg)"
+                )
+                return Foot("region_angle_deg", angle, why, remark, float(self.areas[inside].sum()))
         return None
-    frame = np.stack([*tangent_frame(direction), direction])
-    points, margin = mesh.vertices @ frame.T, radius
-    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
-    low[2] += margin + radius
-    return np.sort(np.array([low, high]) @ frame, axis=0)
-
-
-def _flatter(mesh: Mesh, patch: Patch, direction: Floats, radius: float) -> float | None:
-    """Return the largest angle of the region, degrees, at which the ball stays above the foot of a part; or None."""
-    heights = _heights(mesh, patch, direction)
-    upright = patch.facet_normals @ direction
-    for angle in OPTIONS.flatter_deg:
-        least = np.cos(to_si(angle, "deg"))
-        inside = upright >= least
-        # The ball's lowest point is below its contact by r (1 - cos).
-        if inside.any() and heights[inside].min() >= radius * (1.0 - least):
-            return angle
-    return None
 
 
 def rounded(value: float) -> float:

@@ -13,7 +13,7 @@ from pentapod.base.errors import MeshError
 from pentapod.base.units import from_si, to_si
 from pentapod.base.values import Value
 from pentapod.geometry.directions import tangent_frame
-from pentapod.job.proposal.cutter import foot_key, rounded, tool_for
+from pentapod.job.proposal.cutter import cutter_for, rounded
 from pentapod.job.proposal.options import OPTIONS
 from pentapod.machine.machine import Machine
 from pentapod.machine.parts import WorkVolume
@@ -68,24 +68,25 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
         reasons["part", "region_direction"] = "the side that shows most of the surface"
     remarks.append(f"machined from {side}")
     box = _box(mesh, direction, machine.work)
-    if box is not None:
-        table["region_box_mm"] = [[rounded(v) for v in corner] for corner in from_si(box, "mm")]
-        reasons["part", "region_box_mm"] = "the part is larger than the machine's work volume; this is its middle"
     region = Region(box=box, direction=direction)
     patch = Patch.of(mesh, replace(region, angle=0.5 * np.pi))
     if not len(patch.faces):
         raise MeshError("no side of this surface can be machined", file=part, remedy="check the mesh")
     if box is not None:
+        table["region_box_mm"] = [[rounded(v) for v in corner] for corner in from_si(box, "mm")]
+        reasons["part", "region_box_mm"] = "the part is larger than the machine's work volume; this is its middle"
         remarks.append(
             "it is larger than the work volume: a box in its middle is machined (region_box_mm), "
             f"{100.0 * float(patch.areas.sum() / mesh.facet_areas.sum()):.2g} % of the surface"
         )
-    toolpath, tool = _toolpath(patch, direction), tool_for(patch, direction)
-    toolpath = {**toolpath, "stepover_mm": rounded(OPTIONS.stepover * tool["diameter_mm"])}
-    foot = foot_key(mesh, patch, direction, tool) if box is None else None
-    if foot is not None:
-        key, table[key], reasons["part", key], remark = foot
-        remarks.append(remark)
+    toolpath, cutter = _toolpath(patch, direction), cutter_for(mesh, patch, direction, stands=box is None)
+    toolpath = {**toolpath, "stepover_mm": rounded(OPTIONS.stepover * cutter.diameter_mm)}
+    tool = {"type": "ball", "diameter_mm": cutter.diameter_mm}
+    if cutter.why:
+        reasons["tool", "diameter_mm"] = cutter.why
+    if cutter.foot is not None:
+        table[cutter.foot.key], reasons["part", cutter.foot.key] = cutter.foot.value, cutter.foot.why
+        remarks.append(cutter.foot.remark)
     flatter = "region_angle_deg" in table
     if not flatter and toolpath["strategy"] == "raster" and (walls := _walls(patch, direction)) > OPTIONS.walls:
         toolpath["steep_deg"] = OPTIONS.steep_deg

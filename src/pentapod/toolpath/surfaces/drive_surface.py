@@ -149,7 +149,7 @@ class DriveSurface(RolledSurface):
     def rising(self, patch: Patch) -> tuple[Ints, Floats]:
         """Return the sides (S,) of facets at which a patch ends in a corner, and normals (S, 3) of what rises beyond.
 
-        A region that ends by its angle at the foot of a wall ends there. What leans over the patch is no such wall.
+        A region that ends by its angle at the foot of a wall ends there. What leans far over the patch is no such wall.
         """
         topology = patch.topology
         side = np.flatnonzero(topology.facets_at_edge[topology.edge_of_side.ravel()] == 1)
@@ -159,7 +159,7 @@ class DriveSurface(RolledSurface):
         within, beyond = self._normals(middles - step), self._normals(middles + step)
         bent = np.einsum("ni,ni->n", within, beyond) < np.cos(self.options.crease)
         higher = np.einsum("ni,ni->n", beyond - within, out) < 0.0
-        foot = bent & higher & (beyond @ self.view > -self.options.foot)
+        foot = bent & higher & (beyond @ self.view > -self.options.leaning)
         return side[foot], beyond[foot]
 
     def _normals(self, points: Floats) -> Floats:

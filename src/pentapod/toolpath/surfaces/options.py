@@ -65,9 +65,10 @@ class DriveOptions(Value):
     as a multiple of the radius: links may lead there. region_ends: cosines by which a normal is off the limit of a
     region where that may end; crease: angle between exact and mean normals, radians, from which there are two;
     halvings: of an edge, to find where the region ends on it. wall: cosine to a region's direction below which a facet
-    is one of a wall; foot: cosine by which the foot of one is within the region. steep: angle to the axis, radians,
-    from which a face has a foot; rising: least rise of a facet over it, as a share of its height. overhangs: what hides
-    a point. channels: in which it would be closed. places: how they are moved onto the surface.
+    is one of a wall; foot: cosine by which the foot of one is within the region; leaning: cosine by which one may lean
+    over its foot. steep: angle to the axis, radians, from which a face has a foot; rising: least rise of a facet over
+    it, as a share of its height. overhangs: what hides a point. channels: in which it would be closed. places: how they
+    are moved onto the surface.
     """
 
     step: float = 0.25
@@ -85,6 +86,7 @@ class DriveOptions(Value):
     halvings: int = 12
     wall: float = 0.1
     foot: float = 1e-3
+    leaning: float = 0.1
     steep: float = 0.25 * np.pi
     rising: float = 0.5
     overhangs: OverhangOptions = field(default_factory=OverhangOptions)
