@@ -126,6 +126,9 @@ class FailedClaims:
     def _leaving_less(self) -> Iterator[Trial]:
         """Yield changes that leave less than the job now allows, where that can be estimated."""
         most, accepted = self.options.surely * float(self.job.tolerance.left_share), False
+        if self._accepted <= self.options.hardly:
+            yield from self._as_left()
+            accepted = True
         for words, changes in self._finer():
             self.tell(words)
             if self._left(changes) <= most:
@@ -146,13 +149,18 @@ class FailedClaims:
 
     def _as_left(self) -> Iterator[Trial]:
         """Yield the program as it is, where nothing but a little that is left on the surface stands against it."""
-        own = [self.failed[_LEFT].value] if set(self.failed) == {_LEFT} else []
-        left = min((each for each in (*own, self.left) if each is not None), default=0.0)
-        share = _longer(1e-2 * self.options.more * left)
-        if left > 0.0 and share <= self.options.little:
+        share = self._accepted
+        if share <= self.options.little:
             words = f"at most {100.0 * share:.3g} % of the region stays as it is"
             self.tell(words)
             yield Trial(words, {"tolerance": {"left_share": share}}, 1.0 - share, 1.0 - share)
+
+    @property
+    def _accepted(self) -> float:
+        """Share of the region that would have to be left for a program to pass; infinite where that does not help."""
+        own = [self.failed[_LEFT].value] if set(self.failed) == {_LEFT} else []
+        left = min((each for each in (*own, self.left) if each is not None), default=0.0)
+        return _longer(1e-2 * self.options.more * left) if left > 0.0 else np.inf
 
     def _finer(self) -> Iterator[tuple[str, Changes]]:
         """Yield waterlines on walls, passes nearer together with the same bound of what is left, a smaller cutter."""

@@ -6,6 +6,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from pentapod.base.values import Value
+from pentapod.verify.surface.surface_left import SURFACE_LEFT
+
+LEFT_ALONE = frozenset((SURFACE_LEFT,))
+"""What fails where the tool leaves too much, wherever the part is placed."""
 
 
 class Tried(NamedTuple):
@@ -46,7 +50,8 @@ class AdviceOptions(Value):
     Where a program fails its verdict: nearer, thinner, slower: factors on the distance between passes, on the cutter's
     diameter (with that distance), and on the feed; surface_points: of the region, at which it is estimated what is
     left; near_share: steps along the toolpath, in radii of the ball; surely: share of what may be left that the
-    estimate must keep to.
+    estimate must keep to; little: share of the region that may stay as it is, where nothing else helps; hardly: that
+    may before anything else is planned; more: what is allowed then, as a multiple of what is left.
     """
 
     wanted: int = 1
@@ -88,6 +93,7 @@ class AdviceOptions(Value):
     surface_points: int = 20_000
     near_share: float = 0.05
     surely: float = 0.8
+    hardly: float = 0.005
     little: float = 0.02
     more: float = 1.2
 

@@ -13,7 +13,7 @@ from pentapod.base.progress import Progress
 from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.base.values import Value
 from pentapod.job.advice.failed_claims import FailedClaims
-from pentapod.job.advice.options import AdviceOptions, Tried
+from pentapod.job.advice.options import LEFT_ALONE, AdviceOptions, Tried
 from pentapod.job.advice.settings import TOUCHES, Settings, Tell, joined, merged, met_below
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.advice.starts import starts
@@ -103,6 +103,8 @@ def advised(
             tried[words] = None
             shown.estimate(words)
 
+    if frozenset(failed) == LEFT_ALONE:
+        otherwise = LEFT_ALONE
     because, last = (lambda words: reasons.update({words: None}), lambda: ended[-1])
     own = partial(
         Trials, because=because, ended=last, placed=toolpath is not None and not short, otherwise=otherwise,

@@ -12,17 +12,13 @@ import numpy as np
 from pentapod.base.errors import InputError
 from pentapod.base.units import from_si, to_si
 from pentapod.job.advice.axes import Changes
-from pentapod.job.advice.options import AdviceOptions, Tried
+from pentapod.job.advice.options import LEFT_ALONE, AdviceOptions, Tried
 from pentapod.job.advice.parts import Regions, Smaller
 from pentapod.job.advice.places import Place
 from pentapod.job.advice.settings import Setting, Settings, joined, merged
 from pentapod.job.build.values import job_machine
 from pentapod.planning.estimate import Estimate
 from pentapod.verify.claims.component import COMPONENT_KEPT
-from pentapod.verify.surface.surface_left import SURFACE_LEFT
-
-LEFT_ALONE = frozenset((SURFACE_LEFT,))
-"""What fails where the tool leaves too much, wherever the part is placed."""
 
 FEWEST = 4
 """Points below which a sketch shows nothing."""
@@ -49,9 +45,9 @@ class Trial:
 class Trials:
     """The trials of one job, from estimates for its settings. placed: whether its own plan had a place for the part.
 
-    otherwise: claims that failed in the other way in which a run planned it. meets: heights along the region's
-    direction, metres, above which the tool or the spindle hardly touch the part or do not, where nothing else stood
-    against its own plan, or that of another way.
+    otherwise: claims that failed in the other way in which a run planned it; LEFT_ALONE too where that is what failed
+    in its own. meets: heights along the region's direction, metres, above which the tool or the spindle hardly touch
+    the part or do not, where nothing else stood against its own plan, or that of another way.
     """
 
     settings: Settings
@@ -68,12 +64,17 @@ class Trials:
 
     def all(self, own: bool) -> Iterator[Trial]:
         """Yield the trials, the best first as far as that is known. own: whether the job as it is counts as one."""
-        settings, too_wide = self.settings, self.settings.share_in_reach(self.settings.sketch) < 1.0
+        too_wide = self.settings.share_in_reach(self.settings.sketch) < 1.0
         if self.otherwise:  # it was planned with two kinds of tool axes already
             yield from self._higher()
         if not too_wide:
             yield from self._keeping_all(own)
-        bases = self._bases()
+        if not (self.placed and self.otherwise == LEFT_ALONE):  # smaller regions are tried by what is left on them
+            yield from self._others(own, too_wide=too_wide)
+
+    def _others(self, own: bool, *, too_wide: bool) -> Iterator[Trial]:
+        """Yield changes of more than tool axes and placement."""
+        settings, bases = self.settings, self._bases()
         if short := settings.beyond_a_single_place():
             for base in bases[:1]:
                 yield from self._lengths(base)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from pentapod.base.refusal import Refusal
+from pentapod.job.advice.options import Tried
 from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, write_arrays, write_json
 from pentapod.job.build.left import foreseen
 from pentapod.job.build.limits import pose_limits
@@ -22,7 +23,7 @@ from pentapod.job.stage_runner import StageRunner
 from pentapod.job.task import Task
 from pentapod.job.ways.claims import with_ways
 from pentapod.job.ways.ways import remove_ways, ways, write_ways
-from pentapod.job.withheld import withheld
+from pentapod.job.withheld import STAGE, failures, withheld
 from pentapod.machine.machine import Machine
 from pentapod.numerics.memory import give_back
 from pentapod.planning import PlacedPath
@@ -133,6 +134,20 @@ class Attempt:
         """Return the program that failed its verdict; None where none was written."""
         file = self.staging / WITHHELD
         return file.read_bytes() if file.is_file() else None
+
+    def tried_with(self, share: float, outcome: Outcome) -> Tried:
+        """Return how the job ends where a share of the region may be left: a plan writes the program that is withheld.
+
+        outcome: of the job, whose program fails in this alone.
+        """
+        specification = self.task.specification
+        cutting = specification.cutting
+        if cutting is not None and cutting.coverage is not None:
+            cutting = dataclasses.replace(cutting, coverage=dataclasses.replace(cutting.coverage, share=share))
+        specification = dataclasses.replace(specification, cutting=cutting)
+        verdict = judged(self.staging / WITHHELD, specification, claims=self.task.claims)
+        failed = frozenset(failures(verdict))
+        return Tried(None, outcome.margin) if verdict.passed else Tried(STAGE, failed=failed)
 
     def put_back(self, failed: Outcome, program: bytes | None) -> Outcome:
         """Write the files of a failed run again, and its program that was withheld; return the outcome."""

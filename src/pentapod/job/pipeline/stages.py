@@ -6,8 +6,9 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from pentapod.base.progress import Progress
 from pentapod.base.refusal import Refusal
-from pentapod.job.advice.options import AdviceOptions, Tried
+from pentapod.job.advice.options import LEFT_ALONE, AdviceOptions, Tried
 from pentapod.job.advice.search import advised
 from pentapod.job.build.left import FORBIDDEN
 from pentapod.job.build.limits import timing_limits
@@ -78,8 +79,16 @@ def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried],
     refusal, task, runner = outcome.refusal, attempt.task, attempt.runner
     if refusal is None or refusal.stage in FILES:  # a way is refused by the machine's file, not by the job
         return outcome
-    search = (task.job, task.machine, attempt.mesh, task.toolpath, again, options, runner.progress)
     failed = failures(outcome.verdict) if refusal.stage == STAGE else {}
+
+    def tried(job: Job, progress: Progress) -> Tried:
+        share = job.tolerance.left_share
+        same = job.with_(tolerance={"left_share": task.job.tolerance.left_share}).tables == task.job.tables
+        if same and frozenset(failed) == LEFT_ALONE:
+            return attempt.tried_with(share, outcome)
+        return again(job, progress)
+
+    search = (task.job, task.machine, attempt.mesh, task.toolpath, tried, options, runner.progress)
     forbidden = refusal.stage == FORBIDDEN
     otherwise = outcome.find(FailedWay)
     own = frozenset[str]() if otherwise is None else otherwise.claims

@@ -195,6 +195,11 @@ def nearest_stretch(
 def entry(q: Floats, n: Floats, most: float, warm: int, swept: Swept, room: Room) -> tuple[float, int]:
     """Return the height along a normal at which a ray from q enters the swept volume, up to `most`; the stretch."""
     t, x = 0.0, np.empty(3)
+    # Where the ray begins on the far side of what was cut from there, steps are short: its middle often tells at once.
+    for i in range(3):
+        x[i] = q[i] + 0.5 * most * n[i]
+    if nearest_stretch(x, warm, 0.0, 0.5 * most, swept, room)[0] >= 0.5 * most:
+        return most, warm
     for _ in range(RAY_STEPS):
         for i in range(3):
             x[i] = q[i] + t * n[i]
