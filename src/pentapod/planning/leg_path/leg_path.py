@@ -211,14 +211,17 @@ def leg_path(
     pieces = []
     for a, b in pairwise(bounds.tolist()):
         rows = a + np.flatnonzero(shaping[a : b + 1])
-        between = knots_between(u[rows] - u[a], _reach(u[rows], points[rows], allowed[rows]))
-        both = blended(u[rows] - u[a], np.hstack([points[rows], allowed[rows]]), _too_far, between)
         try:
-            curve = ToolCurve.of(BSpline(both.t, both.c[:, :6].copy(), both.k), toolpath.tilt_centre)
+            curve = _curve(u, points, allowed, rows, toolpath.tilt_centre)
         except TooSharpError:
-            first, last = kept[[a, b]]
-            cause = f"the path bends too sharply to measure its length, between waypoints {first} and {last}"
-            return Refusal("leg path", cause, remedy="A larger tolerance.path_mm may help")
+            try:  # where it turns back beside a stop, the stop is the corner
+                beside = (u[rows] < u[a] + near[a]) | (u[rows] > u[b] - near[b])
+                beside[[0, -1]] = False
+                curve = _curve(u, points, allowed, rows[~beside], toolpath.tilt_centre)
+            except TooSharpError:
+                first, last = kept[[a, b]]
+                cause = f"the path bends too sharply to measure its length, between waypoints {first} and {last}"
+                return Refusal("leg path", cause, remedy="A larger tolerance.path_mm may help")
         ends = np.flatnonzero(np.diff(segment[a:b], append=-1)) + 1
         which = segment[a:b][ends - 1]
         pieces.append(
@@ -236,6 +239,16 @@ def leg_path(
         )
     starts = np.concatenate([[0.0], np.cumsum([piece.length for piece in pieces])])
     return LegPath(tuple(pieces), starts, dwells[bounds])
+
+
+def _curve(u: Floats, points: Floats, allowed: Floats, rows: Ints, tilt_centre: float) -> ToolCurve:
+    """Return the curve through the rows of a polyline, corners blended as far as is allowed.
+
+    Raises TooSharpError where it nearly turns back.
+    """
+    u, points, allowed = u[rows] - u[rows[0]], points[rows], allowed[rows]
+    both = blended(u, np.hstack([points, allowed]), _too_far, knots_between(u, _reach(u, points, allowed)))
+    return ToolCurve.of(BSpline(both.t, both.c[:, :6].copy(), both.k), tilt_centre)
 
 
 def _shaping(u: Floats, points: Floats, allowed: Floats, stops: Bools, segment: Ints) -> Bools:

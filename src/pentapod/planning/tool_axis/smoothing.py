@@ -95,16 +95,18 @@ def smoothed(
     It starts at the leans of `start`, or at `leans` (N, 3), and keeps its placement. None where no such spline was
     found. progress: gets a report after each program; how many there will be is not known.
     """
-    run = _Smoothing(problem, start, keep, options, progress, leans)
+    run, keeping = _Smoothing(problem, start, keep, options, progress, leans), None
     if leans is None:
         run.begin()
-    elif not run.approached():
+    elif (keeping := run.approached()) is None:
         return None
     for _ in range(options.rounds):
         found = run.smoothest()
-        if found is None or not run.add_violated():
+        if found is None:
+            break
+        if not run.add_violated():
             return found
-    return None
+    return keeping
 
 
 class _Smoothing:
@@ -163,19 +165,22 @@ class _Smoothing:
             if cost < self.cost and short < max(self.short, self.options.shortfall):
                 self.c, self.margins, self.short, self.cost = trial, margins, short, cost
 
-    def approached(self) -> bool:
-        """Come up to the margin to keep in steps, and return whether that is done.
+    def approached(self) -> Floats | None:
+        """Come up to the margin to keep in steps, and return the first spline that keeps it everywhere, or None.
 
         In one step the linear model may have no solution where the margins themselves have one.
         """
         keep, short, levels = self.keep, self.short, self.options.levels
-        if short <= self.options.slack:
-            return True
-        for k in range(1, levels + 1):
+        for k in range(1, levels + 1) if short > self.options.slack else ():
             self.aim(keep - short * (1.0 - k / levels))
             if self.smoothest(first=True) is None:
-                return False
-        return True
+                return None
+        for _ in range(self.options.rounds):
+            if not self.add_violated():
+                return self.c
+            if self.smoothest(first=True) is None:
+                return None
+        return None
 
     def aim(self, keep: float) -> None:
         """Keep another margin from now on."""

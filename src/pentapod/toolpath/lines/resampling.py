@@ -44,7 +44,7 @@ def resample(
     if not len(passes):
         return passes
     place = np.concatenate([[0.0], np.cumsum(np.where(passes.within, passes.steps, 1.0))])
-    samples = _evenly(passes, place, chordal, spacing, axis_step)
+    samples = _evenly(passes, place, chordal, spacing, axis_step, closest)
     fixed = np.zeros(len(samples), dtype=np.bool_)
     fixed[np.searchsorted(samples, place[passes.starts[:-1]])] = True
     fixed[np.searchsorted(samples, place[passes.starts[1:] - 1])] = True
@@ -85,12 +85,16 @@ def without_duplicates(passes: Passes, closest: float) -> Passes:
     return passes
 
 
-def _evenly(passes: Passes, place: Floats, chordal: float, spacing: float, axis_step: float) -> Floats:
-    """Return the places of waypoints spread evenly over the density that the tolerances ask for."""
+def _evenly(passes: Passes, place: Floats, chordal: float, spacing: float, axis_step: float, closest: float) -> Floats:
+    """Return the places of waypoints spread evenly over the density that the tolerances ask for.
+
+    Between opposite normals, as on both sides of a channel, the bound on the turning is as good as endless.
+    """
     turn = np.where(passes.within, angle_between(passes.normals[1:], passes.normals[:-1]), 0.0)
     needed = np.maximum(
         np.maximum(passes.steps / spacing, _turning(passes) / axis_step), np.sqrt(passes.steps * turn / (8.0 * chordal))
     )
+    needed = np.minimum(needed, passes.steps / closest)
     quantity = np.concatenate([[0.0], np.cumsum(np.where(passes.within, needed, 1.0))])
     first, last = passes.starts[:-1], passes.starts[1:] - 1
     total = quantity[last] - quantity[first]

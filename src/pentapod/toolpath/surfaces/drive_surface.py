@@ -29,7 +29,9 @@ from pentapod.toolpath.surfaces.options import DriveOptions
 from pentapod.toolpath.surfaces.rolled_surface import RolledSurface
 from pentapod.toolpath.surfaces.tight_channels import has_tight_channels
 
-_KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, float, int, bytes], tuple[FacetTree, Mesh]]] = WeakKeyDictionary()
+_KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, float, int, bytes], tuple[FacetTree, Mesh, bool]]] = (
+    WeakKeyDictionary()
+)
 """Drive surfaces of parts that are in use: planning, the verdict and changes of a job need the same."""
 
 _KEPT = 4
@@ -40,7 +42,7 @@ _KEPT = 4
 class DriveSurface(RolledSurface):
     """The drive surface of a ball of `radius` metres over a part; mesh: the surface itself, facing outwards.
 
-    view (3,): unit, towards the tool.
+    view (3,): unit, towards the tool. lowered: whether it is nearer to the part, for its tight channels.
     """
 
     part: Mesh
@@ -48,6 +50,7 @@ class DriveSurface(RolledSurface):
     centres: BallCentres
     view: Floats
     options: DriveOptions
+    lowered: bool = False
 
     @property
     def places(self) -> BallCentres:
@@ -85,11 +88,11 @@ class DriveSurface(RolledSurface):
             vertices, faces = offset_surface(tree, distance, options.step * distance, options.parts, window)
             # A line goes on over creases of the drive surface: no edge of it parts passes.
             mesh = Mesh.of(vertices, faces, source=part.diagnosis.source, crease_angle=np.pi)
-            found = tree, mesh
-        tree, mesh = known[key] = found
+            found = tree, mesh, tight
+        tree, mesh, tight = known[key] = found
         for other in list(known)[:-_KEPT]:
             known.pop(other, None)
-        return cls(part, mesh, BallCentres(tree, radius, options.places), view, options)
+        return cls(part, mesh, BallCentres(tree, radius, options.places), view, options, tight)
 
     def hides(self, points: Floats, slack: float) -> Bools:
         """Return whether the drive surface lies above points (N, 3) on it by more than `slack` metres."""
@@ -105,6 +108,11 @@ class DriveSurface(RolledSurface):
             around = (0.83 * x + 0.56 * y, 0.56 * x - 0.83 * y)
             for aside in (*around, *(-one for one in around)):
                 hidden[hidden] = self.field.topmost(points[hidden] + aside)[2] > height[hidden]
+        if self.lowered:  # in narrow bores the mesh is too coarse to tell
+            rows, top = np.flatnonzero(hidden), float((self.mesh.vertices @ self.view).max(initial=-np.inf))
+            out = points[rows] + np.maximum(top - points[rows] @ self.view, 0.0)[:, None] * self.view
+            near = self.options.channels.nearer + self.options.channels.free
+            hidden[rows] = ~self.centres.clear(points[rows], out, near * self.radius)
         return hidden
 
     def _patch(self, region: Region) -> Patch:
@@ -149,7 +157,8 @@ class DriveSurface(RolledSurface):
     def rising(self, patch: Patch) -> tuple[Ints, Floats]:
         """Return the sides (S,) of facets at which a patch ends in a corner, and normals (S, 3) of what rises beyond.
 
-        A region that ends by its angle at the foot of a wall ends there. What leans far over the patch is no such wall.
+        A region that ends by its angle at the foot of a wall ends there. What leans over the patch is no such wall, but
+        for a little over a floor.
         """
         topology = patch.topology
         side = np.flatnonzero(topology.facets_at_edge[topology.edge_of_side.ravel()] == 1)
@@ -159,7 +168,8 @@ class DriveSurface(RolledSurface):
         within, beyond = self._normals(middles - step), self._normals(middles + step)
         bent = np.einsum("ni,ni->n", within, beyond) < np.cos(self.options.crease)
         higher = np.einsum("ni,ni->n", beyond - within, out) < 0.0
-        foot = bent & higher & (beyond @ self.view > -self.options.leaning)
+        least = np.where(within @ self.view > np.cos(self.options.steep), self.options.leaning, self.options.foot)
+        foot = bent & higher & (beyond @ self.view > -least)
         return side[foot], beyond[foot]
 
     def _normals(self, points: Floats) -> Floats:

@@ -39,7 +39,8 @@ class ChannelOptions(Value):
     play: of the ball, below which a channel is tight; fits: what the ball may lack, since meshes are rounded; parallel:
     angle between the walls, radians. samples: points of the part for the square of a radius that are looked at, at most
     `most`; share: of them, from which the part has such channels. above: height, a share, by which the part must be
-    above a point to hide it. nearer: by how much nearer to the part the drive surface is made then.
+    above a point to hide it. nearer: by how much nearer to the part the drive surface is made then; free: by how
+    much nearer still the ball may come to the part on its way out along the view.
     """
 
     play: float = 0.047
@@ -50,6 +51,7 @@ class ChannelOptions(Value):
     share: float = 5e-4
     above: float = 0.02
     nearer: float = 0.03
+    free: float = 0.005
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ class DriveOptions(Value):
     region where that may end; crease: angle between exact and mean normals, radians, from which there are two;
     halvings: of an edge, to find where the region ends on it. wall: cosine to a region's direction below which a facet
     is one of a wall; foot: cosine by which the foot of one is within the region; leaning: cosine by which one may lean
-    over its foot. steep: angle to the axis, radians, from which a face has a foot; rising: least rise of a facet over
+    over a floor. steep: angle to the axis, radians, from which a face has a foot; rising: least rise of a facet over
     it, as a share of its height. overhangs: what hides a point. channels: in which it would be closed. places: how they
     are moved onto the surface.
     """
@@ -86,7 +88,7 @@ class DriveOptions(Value):
     halvings: int = 12
     wall: float = 0.1
     foot: float = 1e-3
-    leaning: float = 0.1
+    leaning: float = 0.05
     steep: float = 0.25 * np.pi
     rising: float = 0.5
     overhangs: OverhangOptions = field(default_factory=OverhangOptions)
