@@ -113,6 +113,36 @@ def test_a_plate_thinner_than_the_ball_is_machined_where_the_ball_stays_above_it
     assert np.ptp(centres[:, :2], axis=0).min() > 0.04
 
 
+def ridged(height, count=24):
+    """A plate of 60 × 40 × 1 units with ridges along x on it, whose sides are steeper than 60°."""
+    y = np.linspace(-20.0, 20.0, 2 * count + 1)
+    top = np.stack([y, np.where(np.arange(len(y)) % 2, 1.0 + height, 1.0)], axis=1)
+    section = np.concatenate([top, np.stack([y, np.zeros(len(y))], axis=1)])
+    corners = np.concatenate([np.c_[np.full(len(section), x), section] for x in (-30.0, 30.0)])
+    n, k = len(y), np.arange(len(y) - 1)
+    front = np.stack([k, k + 1, k + 1 + n, k + n], axis=1)  # strips from the top down to the foot
+    below = np.stack([k + n, k + 1 + n, k + 1 + 3 * n, k + 3 * n], axis=1)
+    sides = np.array([[0, n, 3 * n, 2 * n], [3 * n - 1, 4 * n - 1, 2 * n - 1, n - 1]])
+    quads = np.concatenate([front, front[:, ::-1] + 2 * n, below, below[:, ::-1] - n, sides])
+    return trimesh.Trimesh(corners, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]), process=False)
+
+
+def test_a_part_low_beside_the_usual_ball_gets_a_smaller_one(tmp_path):
+    """6 mm fit a part of 60 mm, but that ball would reach below the foot of all ridges."""
+    job, proposal = proposed(tmp_path, ridged(2.2))
+    assert job_mesh(job).diagnosis.watertight
+    assert 0.3 * 6.0 <= job.tool.diameter_mm < 6.0
+    assert "below most" in proposal.reasons["tool", "diameter_mm"]
+    steepest = np.degrees(np.arctan(2.2 / (20.0 / 24.0)))
+    assert job.part.region_angle_deg >= steepest
+    assert 0.5 * job.tool.diameter_mm * (1.0 - np.cos(np.radians(steepest))) <= 1.0
+
+
+def test_a_narrow_part_gets_a_narrow_ball(tmp_path):
+    job, _ = proposed(tmp_path, trimesh.creation.box((60, 6, 5)))
+    assert job.tool.diameter_mm == 2.0
+
+
 def test_walls_are_machined_down_to_where_the_ball_would_reach_into_the_table(tmp_path):
     job, proposal = proposed(tmp_path, SHAPES["block"][0]())
     mesh, ball = job_mesh(job), 0.5e-3 * job.tool.diameter_mm

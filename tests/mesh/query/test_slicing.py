@@ -154,6 +154,16 @@ def test_resampling_holds_every_tolerance(chordal, spacing, seed):
             assert np.linalg.norm(line[:-1] + t[:, None] * d - point, axis=1).min() <= chordal + 1e-6
 
 
+@pytest.mark.parametrize("length", [1e-4, 1e-3])
+def test_between_opposite_normals_points_are_no_nearer_than_asked(length):
+    """Across a channel, where normals of both walls cancel: there were 40,000 waypoints in a millimetre."""
+    line = np.array([[0.0, 0.0, 0.0], [5e-3, 0.0, 0.0], [5e-3 + length, 0.0, 0.0], [1e-2, 0.0, 0.0]])
+    normals = np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, -1.0, 0.0]])
+    few = resample(Passes.of([(line, normals)]), chordal=1e-5, spacing=2e-3, axis_step=0.05, closest=1e-5)
+    assert few.steps.min() >= 1e-5 * (1.0 - 1e-9)
+    assert few.lengths == pytest.approx([1e-2])
+
+
 def test_resampling_is_even_where_only_the_spacing_binds():
     mesh = Mesh.of(*surfaces.grid(lambda x, y: 0 * x, cells=37))
     passes = slice_mesh(mesh, ([0.0, 1.0, 0.0], -0.043, 0.02, 5), ALL)

@@ -223,7 +223,8 @@ def test_a_region_that_ends_at_the_foot_of_walls_ends_in_a_corner_there(pocket):
     assert around == pytest.approx(2.0 * (18e-3 + 10e-3), rel=0.05)
     assert pocket.feet(patch).sum() == len(sides)
     assert not pocket.feet(pocket.patch(Region(angle=np.radians(90.0)))).any()
-    for angle, below, some in ((50.0, 0.0, True), (50.0, 0.4, False), (90.0, 0.4, False)):
+    # Walls that lean over a little are corners, too: by 1.7° here, then by 4.6°.
+    for angle, below, some in ((50.0, 0.0, True), (50.0, 0.15, True), (50.0, 0.4, False), (90.0, 0.4, False)):
         wide = DriveSurface.of(part(slotted(14.0, below=below)), R, UP)
         assert wide.feet(wide.patch(Region(angle=np.radians(angle)))).any() == some
 
@@ -258,6 +259,21 @@ def test_a_slot_hardly_wider_than_the_ball_is_machined_at_its_bottom(play, turn)
     along = np.linspace(-0.029, 0.029, 100)
     bottom = np.stack([np.cos(turn) * along, np.sin(turn) * along, np.full(100, 10e-3 + R)], axis=1)
     assert KDTree(centres).query(bottom)[0].max() < 0.6 * 3e-3
+
+
+@pytest.mark.parametrize("play", [0.0, 0.04, 0.12])
+def test_a_round_bore_hardly_wider_than_the_ball_is_machined_at_its_bottom(play):
+    """The inscribed circle of its 40 sides is as wide as the ball, and by `play` mm wider."""
+    width = (R + 0.5e-3 * play) / np.cos(np.pi / 40.0)
+    ring = trimesh.creation.annulus(width, 12e-3, 12e-3, sections=40)
+    floor = trimesh.creation.cylinder(12e-3, 4e-3, sections=40)
+    floor.apply_translation([0.0, 0.0, -7e-3])
+    mesh = part(trimesh.util.concatenate([ring, floor]))
+    toolpath = make_toolpath(mesh, BallCutter(R), RasterOptions(stepover=3e-3))
+    centres = dense([s.tips + R * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT], 40)
+    assert gaps(mesh, centres[::20]).min() >= R - 1e-5 - 1e-6
+    axis = np.stack([np.zeros(30), np.zeros(30), np.linspace(-5e-3 + R, 6e-3, 30)], axis=1)
+    assert KDTree(centres).query(axis)[0].max() < 1e-3
 
 
 def test_only_channels_with_parallel_walls_make_the_surface_nearer_to_the_part():

@@ -33,8 +33,8 @@ class SmoothingOptions:
     trust region, as shares of the cone. good: ratio of actual to predicted decrease from which it is doubled; shrink:
     its factor after a rejected step. rough, fine, finer: accuracies of the first program and of the last, and the
     accuracy in between as a share of the relative decrease of the step before. levels: steps in which given leans come
-    up to the margin to keep; far: all waypoints within this distance of it are active then. cost: of the penalty on
-    excess.
+    up to the margin to keep; enough: share of it that is enough where they come up no farther; far: all waypoints
+    within this distance of it are active then. cost: of the penalty on excess.
     """
 
     steps: int = 40
@@ -53,6 +53,7 @@ class SmoothingOptions:
     fine: float = 1e-6
     finer: float = 1e-2
     levels: int = 4
+    enough: float = 0.5
     far: float = 0.3
     cost: CostOptions = field(default_factory=CostOptions)
 
@@ -95,18 +96,21 @@ def smoothed(
     It starts at the leans of `start`, or at `leans` (N, 3), and keeps its placement. None where no such spline was
     found. progress: gets a report after each program; how many there will be is not known.
     """
-    run, keeping = _Smoothing(problem, start, keep, options, progress, leans), None
+    run = _Smoothing(problem, start, keep, options, progress, leans)
     if leans is None:
         run.begin()
-    elif (keeping := run.approached()) is None:
-        return None
+    else:
+        reached = run.approached()
+        if reached < keep:
+            return run.kept(run.c, reached) if reached >= options.enough * keep else None
+    begun = run.c
     for _ in range(options.rounds):
         found = run.smoothest()
         if found is None:
             break
         if not run.add_violated():
             return found
-    return keeping
+    return None if leans is None else run.kept(begun, keep)
 
 
 class _Smoothing:
@@ -165,21 +169,29 @@ class _Smoothing:
             if cost < self.cost and short < max(self.short, self.options.shortfall):
                 self.c, self.margins, self.short, self.cost = trial, margins, short, cost
 
-    def approached(self) -> Floats | None:
-        """Come up to the margin to keep in steps, and return the first spline that keeps it everywhere, or None.
+    def approached(self) -> float:
+        """Come up to the margin to keep in steps, and return how far that is done.
 
         In one step the linear model may have no solution where the margins themselves have one.
         """
         keep, short, levels = self.keep, self.short, self.options.levels
-        for k in range(1, levels + 1) if short > self.options.slack else ():
+        if short <= self.options.slack:
+            return keep
+        for k in range(1, levels + 1):
             self.aim(keep - short * (1.0 - k / levels))
             if self.smoothest(first=True) is None:
-                return None
+                return keep - short * (1.0 - (k - 1) / levels)
+        return keep
+
+    def kept(self, c: Floats, keep: float) -> Floats | None:
+        """Return the first spline from coefficients (K, 2) that keeps a margin everywhere, however smooth; or None."""
+        self.c, self.cost, self.keep, self.radius = c, self.objective.of(c), keep, self.options.largest_radius
+        self.activate(self.rows)
         for _ in range(self.options.rounds):
+            if self.short > self.options.slack and self.smoothest(first=True) is None:
+                return None
             if not self.add_violated():
                 return self.c
-            if self.smoothest(first=True) is None:
-                return None
         return None
 
     def aim(self, keep: float) -> None:

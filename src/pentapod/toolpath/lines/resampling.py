@@ -94,7 +94,7 @@ def _evenly(passes: Passes, place: Floats, chordal: float, spacing: float, axis_
     needed = np.maximum(
         np.maximum(passes.steps / spacing, _turning(passes) / axis_step), np.sqrt(passes.steps * turn / (8.0 * chordal))
     )
-    needed = np.minimum(needed, passes.steps / closest)
+    needed = np.minimum(needed, 0.5 * passes.steps / closest)  # rounded up, that is at most twice as many
     quantity = np.concatenate([[0.0], np.cumsum(np.where(passes.within, needed, 1.0))])
     first, last = passes.starts[:-1], passes.starts[1:] - 1
     total = quantity[last] - quantity[first]
