@@ -10,6 +10,7 @@ import pytest
 import concave_parts
 from pentapod.cli.commands.new import dome_stl, job_text
 from pentapod.job import Job, run
+from pentapod.job.advice.options import Tried
 from pentapod.job.build.left import foreseen, missed_by_drops
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import Reports, job_toolpath
@@ -130,7 +131,7 @@ def test_a_little_more_that_may_be_left_needs_no_other_plan(tmp_path, monkeypatc
     """The plan would write the same program, which is judged again; that it does, a plan shows."""
     job = leaning(tmp_path, 75.0, 0.45, tolerance={"left_share": 0.008})
     with monkeypatch.context() as patched:
-        patched.setattr(importlib.import_module("pentapod.job.pipeline.run"), "tried", None)
+        patched.setattr(importlib.import_module("pentapod.job.pipeline.run"), "tried", lambda *_, **__: Tried("again"))
         outcome = run(job, tmp_path / "out")
     (advice,) = outcome.refusal.advice
     assert list(advice.tables) == ["tolerance"]

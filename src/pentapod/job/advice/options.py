@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from pentapod.base.values import Value
-from pentapod.verify.surface.surface_left import SURFACE_LEFT
 
-LEFT_ALONE = frozenset((SURFACE_LEFT,))
-"""What fails where the tool leaves too much, wherever the part is placed."""
+FEWEST = 4
+"""Points below which a sketch shows nothing."""
 
 
 class Tried(NamedTuple):

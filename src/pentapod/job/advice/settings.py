@@ -29,6 +29,7 @@ from pentapod.planning.problem.constraints import FREE
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.toolpath.toolpath import Toolpath
+from pentapod.verify.surface.surface_left import SURFACE_LEFT
 
 Tell = Callable[[str], None]
 """Takes words for what is tried."""
@@ -38,6 +39,9 @@ TOUCHES = ("tool body", "the tool touches")
 
 ABOVE_THE_TIP = (*TOUCHES, "spindle touches")
 """Beginnings of the names of limits that depend on the tool's direction on the part, and not on where this stands."""
+
+LEFT_ALONE = frozenset((SURFACE_LEFT,))
+"""What fails where the tool leaves too much, wherever the part is placed."""
 
 
 def met_below(

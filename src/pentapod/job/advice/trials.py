@@ -12,16 +12,13 @@ import numpy as np
 from pentapod.base.errors import InputError
 from pentapod.base.units import from_si, to_si
 from pentapod.job.advice.axes import Changes
-from pentapod.job.advice.options import LEFT_ALONE, AdviceOptions, Tried
+from pentapod.job.advice.options import FEWEST, AdviceOptions, Tried
 from pentapod.job.advice.parts import Regions, Smaller
 from pentapod.job.advice.places import Place
-from pentapod.job.advice.settings import Setting, Settings, joined, merged
+from pentapod.job.advice.settings import LEFT_ALONE, Setting, Settings, joined, merged
 from pentapod.job.build.values import job_machine
 from pentapod.planning.estimate import Estimate
 from pentapod.verify.claims.component import COMPONENT_KEPT
-
-FEWEST = 4
-"""Points below which a sketch shows nothing."""
 
 Because = Callable[[str], None]
 """Takes words for why nothing else is tried, or what stands in the way of all that was."""

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from pentapod.base.progress import Progress
 from pentapod.base.refusal import Refusal
-from pentapod.job.advice.options import LEFT_ALONE, AdviceOptions, Tried
+from pentapod.job.advice.options import AdviceOptions, Tried
 from pentapod.job.advice.search import advised
+from pentapod.job.advice.settings import LEFT_ALONE
 from pentapod.job.build.left import FORBIDDEN
 from pentapod.job.build.limits import timing_limits
 from pentapod.job.build.pieces import job_part
