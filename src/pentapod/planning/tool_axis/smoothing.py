@@ -93,8 +93,9 @@ def smoothed(
 ) -> Floats | None:
     """Return coefficients (K, 2) of the smoothest spline of the axes that keeps the margin `keep`.
 
-    It starts at the leans of `start`, or at `leans` (N, 3), and keeps its placement. None where no such spline was
-    found. progress: gets a report after each program; how many there will be is not known.
+    It starts at the leans of `start`, or at `leans` (N, 3), and keeps its placement. From given leans it is also the
+    first spline that keeps the margin, or a part of it (`enough`), where the search for the smoothest one fails. None
+    where none was found. progress: gets a report after each program; how many there will be is not known.
     """
     run = _Smoothing(problem, start, keep, options, progress, leans)
     if leans is None:
