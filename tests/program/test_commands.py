@@ -213,8 +213,10 @@ def test_a_job_is_compensated_by_itself_and_its_posted_rows_are_judged(soft_job,
         assert run(["simulate", str(each), "--job", str(soft_job / "job.toml"), "-q", "--within", "0.1"]) == 0
         assert run(["monitor", str(file), "--program", str(each), "--job", str(soft_job / "job.toml")]) == 0
         assert capsys.readouterr().out
-    # Legs are rounded to 1e-8 mm in each file, and the tip moves by a few times as much.
-    assert np.abs(tips[0] - tips[1]).max() < 5e-8
+    # They say the same, but for a rare leg that is rounded to the next 1e-8 mm; the tip moves by a few times as much.
+    differ = np.abs(tips[0] - tips[1]).max(axis=1)
+    assert np.mean(differ > 0.0) < 1e-3
+    assert differ.max() < 5e-8
     # Judged on a machine with other springs they are somebody else's.
     text = (soft_job / "soft.toml").read_text(encoding="utf-8").replace("stiffness_n_um = 20", "stiffness_n_um = 21")
     other = tmp_path / "soft.toml"
