@@ -264,14 +264,15 @@ def test_a_reversal_over_a_short_way_is_one_corner(desk, width, tilt_centre):
     assert trajectory.duration < 1.02 * 2 * (0.01 / 0.01 + 0.01)
 
 
-def test_a_path_that_turns_back_right_beside_its_start_is_known(desk):
-    """No waypoint of it turns sharply, and the start is a stop already: the curve bent in nanometres there."""
+def test_a_path_that_turns_back_right_beside_a_stop_is_known(desk):
+    """No waypoint of it turns sharply, and there is a stop already: the curve bent in nanometres beside it."""
     points = [[0, 0, 0], [1.8e-6, 0, 0], [1.8e-6, 1e-8, 0], [-0.02, 1e-8, 0]]
     tips, axes = fan(points, np.zeros(4))
-    toolpath = Toolpath((Segment(SegmentKind.CUT, tips, axes, 0.01),), 0.002)
+    rapid = Segment(SegmentKind.RAPID, *fan([[0, 0, 0.005], [0, 0, 0]], np.zeros(2)), np.inf)
+    toolpath = Toolpath((rapid, Segment(SegmentKind.CUT, tips, axes, 0.01)), 0.002)
     path = leg_path(placed_on(desk, toolpath), desk, path_tolerance=20e-6, axis_tolerance=AXIS_TOLERANCE)
     assert isinstance(path, LegPath)
-    assert path.length == pytest.approx(0.02, abs=4e-6)
+    assert [piece.length for piece in path.pieces] == pytest.approx([0.005, 0.02], abs=4e-6)
     assert isinstance(retime(path, desk), Trajectory)
 
 

@@ -269,6 +269,10 @@ def test_a_round_bore_hardly_wider_than_the_ball_is_machined_at_its_bottom(play)
     floor = trimesh.creation.cylinder(12e-3, 4e-3, sections=40)
     floor.apply_translation([0.0, 0.0, -7e-3])
     mesh = part(trimesh.util.concatenate([ring, floor]))
+    surface = DriveSurface.of(mesh, R, UP)
+    inside = surface.patch(Region()).vertices
+    inside = inside[np.linalg.norm(inside[:, :2], axis=1) < 1e-3]
+    assert not surface.hides(inside, 1e-5).any()
     toolpath = make_toolpath(mesh, BallCutter(R), RasterOptions(stepover=3e-3))
     centres = dense([s.tips + R * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT], 40)
     assert gaps(mesh, centres[::20]).min() >= R - 1e-5 - 1e-6
