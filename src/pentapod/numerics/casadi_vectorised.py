@@ -49,7 +49,7 @@ class Vectorised:
 
     def __call__(self, *inputs: Floats) -> list[Floats]:
         """Return the outputs at all points."""
-        count = max(x.shape[1] for x in inputs)
+        (count,) = np.broadcast_shapes(*(x.shape[1:] for x in inputs))  # 0 where one of them has no point
         out = [np.empty((size, count)) for size in self._sizes]
         for first in range(0, count, _BLOCK):
             part = slice(first, min(first + _BLOCK, count))

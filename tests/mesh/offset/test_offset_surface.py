@@ -93,6 +93,35 @@ def test_a_slot_with_little_play_is_found_between_the_nodes(shift):
     np.testing.assert_allclose(apart, R, atol=1e-6)
 
 
+def channel(end, opening, turn):
+    """A channel up from a plate that opens along y: a ball's centre has room `end` wide at y = 0, then more."""
+    blocks = [
+        trimesh.creation.box(bounds=[[-0.02, -0.03, 0.0], [0.02, -R, 0.012]]),
+        trimesh.creation.box(bounds=[[-0.03, -0.03, -0.005], [0.03, 0.03, 0.003]]),
+    ]
+    for side in (1.0, -1.0):
+        wall = trimesh.creation.box(bounds=[[min(0.0, 0.02 * side), -0.03, 0.0], [max(0.0, 0.02 * side), 0.03, 0.012]])
+        wall.apply_transform(trimesh.transformations.rotation_matrix(-0.5 * side * opening, [0.0, 0.0, 1.0]))
+        wall.apply_translation([side * (0.5 * end + R / np.cos(0.5 * opening)), 0.0, 0.0])
+        blocks.append(wall)
+    whole = trimesh.util.concatenate(blocks)
+    whole.apply_transform(trimesh.transformations.rotation_matrix(turn, [0.0, 0.0, 1.0]))
+    return Mesh.of(whole.vertices, whole.faces)
+
+
+@pytest.mark.parametrize("end", [3e-4, 5e-4])
+@pytest.mark.parametrize("turn_deg", [20.0, 45.0])
+def test_no_facet_leads_across_a_channel_about_as_wide_as_a_cell(end, turn_deg):
+    """Some edges of the grid, whose step is 0.75 mm, meet the channel, and some do not."""
+    part = channel(end, np.radians(5.0), np.radians(turn_deg))
+    vertices, triangles = offset(part, parts=8)
+    beyond = FacetTree.of(part).closest(vertices[triangles].mean(axis=1), 2.0 * R)[0] / R - 1.0
+    assert beyond.max() < 0.05
+    without, its = offset(part)
+    assert FacetTree.of(part).closest(without[its].mean(axis=1), 2.0 * R)[0].max() > 1.05 * R
+    assert all(number % 2 == 0 for number in facets_at_edges(triangles))
+
+
 def test_the_grid_stays_as_it_is_where_no_channel_is_narrow():
     for shape in (trimesh.creation.torus(0.012, 0.004), trimesh.creation.box([0.01] * 3)):
         part = Mesh.of(shape.vertices, shape.faces)

@@ -22,6 +22,9 @@ from pentapod.planning.placement.placed_path import UnplacedPath
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.weights import NEEDED_MARGIN
+from pentapod.planning.tool_axis.smoothing import OPTIONS as SMOOTHING
+from pentapod.planning.tool_axis.smoothing import _Smoothing, smoothed
+from pentapod.planning.tool_axis.spline import AxisSpline
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 TILT = np.radians(20.0)
@@ -113,6 +116,52 @@ def test_no_field_fits_there_but_every_waypoint_by_itself(desk, here):
     assert problem.values_of(start.margins, here, leans).min() >= NEEDED_MARGIN
     mixed = problem.values_of(start.margins, here, own.mixed).min(axis=1)
     assert (mixed >= NEEDED_MARGIN).all()
+
+
+@pytest.fixture
+def swaying(desk, here):
+    """A problem in which the axis sways, a candidate whose field falls short, and the waypoints' own leans."""
+    asked = options(desk, here, 0.03)
+    samples = ToolpathSamples.of(zigzag(), TILT)
+    problem = PlacementProblem.of(samples, desk, asked["constraints"], limits=asked["limits"])
+    start = problem.candidate(problem.margins[0], here, problem.upright)
+    return problem, start, OwnLeans.of(problem, start).mixed
+
+
+def smallest(problem, start, coefficients) -> float:
+    leans = AxisSpline.of(problem.samples, problem.cone).leans(coefficients)
+    return float(problem.values_of(start.margins, start.transform, leans).min())
+
+
+@pytest.mark.parametrize(("keep", "at_least"), [(0.3, 0.3), (0.5, 0.25), (0.9, None)])
+def test_a_part_of_the_margin_is_enough_where_no_spline_comes_up_to_it(keep, at_least, swaying):
+    problem, start, leans = swaying
+    found = smoothed(problem, start, keep, leans=leans)
+    assert (found is None) == (at_least is None)
+    if found is not None:
+        kept = smallest(problem, start, found)
+        assert kept >= at_least - SMOOTHING.slack
+        assert kept <= keep + 1e-3
+
+
+def test_where_the_smoothest_leans_are_not_found_the_first_that_fit_count(swaying, monkeypatch):
+    """They are rougher, but keep the margin at all waypoints."""
+    problem, start, leans = swaying
+    smooth, search = smoothed(problem, start, 0.1, leans=leans), _Smoothing.smoothest
+    monkeypatch.setattr(_Smoothing, "smoothest", lambda run, *, first=False: search(run, first=True) if first else None)
+    found = smoothed(problem, start, 0.1, leans=leans)
+    spline = AxisSpline.of(problem.samples, problem.cone)
+    assert smallest(problem, start, found) >= 0.1 - SMOOTHING.slack
+    assert spline.cost_of(found) > 1.5 * spline.cost_of(smooth)
+
+
+def test_leans_far_from_all_limits_are_smoothed(swaying):
+    """No margin is near the one to keep: the program around them has no rows."""
+    problem, start, leans = swaying
+    found = smoothed(problem, start, -5.0, leans=leans)
+    assert found is not None
+    spline = AxisSpline.of(problem.samples, problem.cone)
+    assert spline.cost_of(found) <= spline.cost_of(spline.fitted(leans)) + 1e-12
 
 
 def test_where_all_own_leans_fit_near_the_field_none_is_left_to_try(desk, here):

@@ -71,7 +71,7 @@ def offset_surface(
     keys, outside, wide = _nodes(tree, grid, blocks, distance)
     nodes = Nodes.of(grid, keys, outside)
     vertices, triangles = _contour(tree, nodes, blocks, wide, distance)
-    if parts > 1 and len(missed := missed_cells(tree, nodes, vertices, distance)):
+    if parts > 1 and len(missed := missed_cells(tree, nodes, vertices, triangles, distance)):
         parts = min(parts, int((MOST_NODES / len(missed)) ** (1.0 / 3.0)))
         return _contour(tree, divided(tree, nodes, missed, parts, distance), blocks, wide, distance)
     return vertices, triangles

@@ -4,6 +4,9 @@ All corners of a cell are inside, and yet a channel may run through it, in which
 distance grows along its gradient by as much as the way, up to where another part of the mesh is as near: the way from a
 node inside, away from its closest point, leads to the level and just beyond. If that place is outside, but in a cell
 all of whose corners are inside, the grid misses it there. Such cells, and those around them, are divided.
+
+A channel about as wide as a cell may be met by some of its edges only: then facets lead across it. Their middles are
+beyond the level, and the cells there are divided as well.
 """
 
 from __future__ import annotations
@@ -21,6 +24,8 @@ from pentapod.mesh.topology import components
 
 _BEYOND = 0.01
 """How far beyond the level a place is looked at, as a share of the distance: half of the least play that is found."""
+_ACROSS = 0.05
+"""How far beyond the level the middle of a facet is that leads across a channel, as a share of the distance."""
 _LINK = 1.0
 """How near, in distances, a missed place is to the surface or another such place: mirrored sheets are two away."""
 _CORNERS = np.indices((2, 2, 2)).reshape(3, -1).T
@@ -82,8 +87,27 @@ def indices(keys: Ints, wanted: Ints) -> Ints:
     return np.where(keys[at] == wanted, at, -1)
 
 
-def missed_cells(tree: FacetTree, nodes: Nodes, surface: Floats, level: float) -> Ints:
-    """Return the cells (C, 3) through which the level runs between the nodes, and those around them that may hold it.
+def missed_cells(tree: FacetTree, nodes: Nodes, surface: Floats, facets: Ints, level: float) -> Ints:
+    """Return the cells (C, 3) in which a surface is not the level, and those around them that may hold it.
+
+    surface (V, 3), facets (T, 3): as it was found.
+    """
+    grid = nodes.cells.grid
+    middles = surface[facets].mean(axis=1)
+    across = middles[~tree.within(middles, level * (1.0 + _ACROSS))]
+    cells = np.concatenate([
+        _between_nodes(tree, nodes, surface, level), np.floor((across - grid.low) / grid.step).astype(np.intp)
+    ])  # fmt: skip
+    around = np.unique((cells[:, None] + np.indices((3, 3, 3)).reshape(3, -1).T - 1).reshape(-1, 3), axis=0)
+    known = indices(nodes.keys, grid.keys(around[:, None] + _CORNERS))
+    around = around[(known >= 0).all(axis=1)]
+    half = 0.5 * math.sqrt(3.0) * grid.step
+    gap = tree.closest(grid.low + (around + 0.5) * grid.step, level + 1.01 * half)[0]
+    return around[np.abs(gap - level) <= 1.001 * half]
+
+
+def _between_nodes(tree: FacetTree, nodes: Nodes, surface: Floats, level: float) -> Ints:
+    """Return the cells (C, 3) through which the level runs between the nodes.
 
     surface (V, 3): the vertices that were found. What is not near to them or to missed places near to them is the
     mirrored sheet within the part, or a cavity.
@@ -107,13 +131,7 @@ def missed_cells(tree: FacetTree, nodes: Nodes, surface: Floats, level: float) -
     a, b = own.query_pairs(_LINK * level, output_type="ndarray").T
     piece = components(len(points), a, b)[1]
     near = KDTree(surface).query(points, distance_upper_bound=_LINK * level)[0] < np.inf
-    cells = cells[np.isin(piece, piece[near])]
-    around = np.unique((cells[:, None] + np.indices((3, 3, 3)).reshape(3, -1).T - 1).reshape(-1, 3), axis=0)
-    known = indices(nodes.keys, grid.keys(around[:, None] + _CORNERS))
-    around = around[(known >= 0).all(axis=1)]
-    half = 0.5 * math.sqrt(3.0) * grid.step
-    gap = tree.closest(grid.low + (around + 0.5) * grid.step, level + 1.01 * half)[0]
-    return around[np.abs(gap - level) <= 1.001 * half]
+    return cells[np.isin(piece, piece[near])]
 
 
 def divided(tree: FacetTree, nodes: Nodes, cells: Ints, parts: int, level: float) -> Nodes:
