@@ -14,13 +14,15 @@ from pentapod.job import Job, run, task
 from pentapod.job.build.pieces import job_without, program_toolpath
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_mesh
-from pentapod.job.mending import mend_of, most_left_out
+from pentapod.job.mending import FailedMend, mend_of, most_left_out
 from pentapod.job.outcome import Outcome, Stage
+from pentapod.job.pipeline import attempt
 from pentapod.machine.machine import Machine
 from pentapod.program import write_csv
 from pentapod.toolpath import SegmentKind
 from pentapod.toolpath.linking.partition import cutting_intervals
 from pentapod.verify import Verdict
+from pentapod.verify.surface.surface_left import SURFACE_LEFT
 from pentapod.verify.verdict.verdict import Certificate, Place
 from short_motion import motion
 
@@ -147,6 +149,28 @@ def test_a_program_that_says_it_leaves_out_much_is_refused(dome, tmp_path):
         with pytest.raises(ProgramError, match="leaves out more cuts than it may"):
             program_toolpath(job, mesh, file, most=most)
     assert len(program_toolpath(job, mesh, file, most=0.05)) != len(whole)
+
+
+def test_a_mend_after_which_too_much_is_left_is_told_and_may_be_advised(dome, tmp_path, monkeypatch):
+    """The first placement is refused for some waypoints, as above; what is left after the mend is found to be 0.3 %."""
+    job, *_ = dome
+
+    def program(self, file):
+        if self.left_out:
+            write_csv(short, file)
+            return short
+        return self.runner.run("placement", lambda: refused((123, 125)))
+
+    short = motion()[0]
+    left = Certificate(SURFACE_LEFT, False, 0.3, 0.1, "%", Place(), "")
+    monkeypatch.setattr(task.Task, "program", program)
+    monkeypatch.setattr(attempt, "judged", lambda *_, **__: Verdict((left,)))
+    done = run(job, tmp_path / "out", advice=None)
+    assert done.refusal.stage == "placement"
+    assert done.find(FailedMend) == FailedMend(0.3)
+    (said,) = (stage.remark for stage in done.stages if isinstance(stage.value, FailedMend))
+    assert "are left out, because they cannot be done: tool body touches the part. It failed, too: verdict" in said
+    assert not (tmp_path / "out" / "program.csv").exists()
 
 
 @pytest.mark.slow

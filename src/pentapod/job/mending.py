@@ -134,6 +134,19 @@ class FailedWay(Value):
         return cls(frozenset(failed), left, met_below(outcome.job, outcome.find(Toolpath), short, ADVICE))
 
 
+@dataclass(frozen=True)
+class FailedMend(Value):
+    """A mend after which a program fails in one thing alone. left: percent of the region that it leaves."""
+
+    left: float
+
+    @classmethod
+    def of(cls, outcome: Outcome) -> FailedMend | None:
+        """Return the mend whose run ended with an outcome; None where more stands against it than what is left."""
+        failed = failures(outcome.verdict)
+        return cls(_value(failed)) if set(failed) == {SURFACE_LEFT} else None
+
+
 def most_left_out(job: Job, options: MendOptions = OPTIONS) -> float:
     """Return the share of its cuts that a job's program may leave out: none where no claim judges what is left."""
     if not covers_region(job) and job.tolerance.si.left is None:

@@ -30,7 +30,7 @@ from pentapod.job.build.region import rolls
 from pentapod.job.build.specification import job_coverage
 from pentapod.job.build.toolpath import Reports, job_toolpath
 from pentapod.job.build.values import job_mesh
-from pentapod.job.mending import FailedWay, other_way
+from pentapod.job.mending import FailedMend, FailedWay, other_way
 from pentapod.job.outcome import Outcome, Stage
 from pentapod.job.pipeline import attempt, other_attempts
 from pentapod.job.pipeline.other_attempts import ANOTHER_WAY
@@ -232,7 +232,8 @@ def test_a_way_that_failed_tells_the_heights_at_which_the_tool_meets_the_part_wh
     assert FailedWay.of(failing(job, SURFACE_LEFT)).meets == ()
 
 
-def test_advice_gets_what_another_way_left_and_at_which_heights_the_tool_met_the_part(job, monkeypatch):
+@pytest.mark.parametrize("first", [0.1, 0.3])
+def test_advice_gets_what_another_way_left_and_at_which_heights_the_tool_met_the_part(first, job, monkeypatch):
     def advised(*given, **_):
         told.append(given[-2:])
         return SimpleNamespace(advice=(), sentence="nothing")
@@ -241,12 +242,12 @@ def test_advice_gets_what_another_way_left_and_at_which_heights_the_tool_met_the
     monkeypatch.setattr("pentapod.job.pipeline.stages.advised", advised)
     refused, runner = failing(job, limits=("leg 1 too long",)), StageRunner(silent)
     no = frozenset(("no",))
-    ways = [FailedWay(no), FailedWay(no, 0.3, (1.0, 2.0)), FailedWay(no, 0.2, (3.0,))]
+    ways = [FailedMend(first), FailedWay(no), FailedWay(no, 0.3, (1.0, 2.0)), FailedWay(no, 0.2, (3.0,))]
     runner.stages = [*refused.stages, *(Stage(ANOTHER_WAY, 0.0, way) for way in ways)]
     task = SimpleNamespace(job=job, machine=refused.machine, toolpath=None)
     attempt = SimpleNamespace(task=task, runner=runner, mesh=None, refused=lambda refusal: refusal)
     with_advice(attempt, replace(refused, stages=tuple(runner.stages)), None, OPTIONS)
-    assert told == [(0.2, (1.0, 2.0))]
+    assert told == [(min(first, 0.2), (1.0, 2.0))]
 
 
 @pytest.mark.parametrize(("second", "expected"), [((SURFACE_LEFT,), "second"), ((), "first")])

@@ -10,7 +10,7 @@ from pentapod.job.build.left import FORBIDDEN
 from pentapod.job.build.other_ways import ends, may_stand, stands
 from pentapod.job.build.pieces import job_without
 from pentapod.job.build.specification import job_specification
-from pentapod.job.mending import OPTIONS, FailedWay, Mend, mend_of, most_left_out, other_way
+from pentapod.job.mending import OPTIONS, FailedMend, FailedWay, Mend, mend_of, most_left_out, other_way
 from pentapod.job.outcome import Outcome, Stage
 from pentapod.job.pipeline.attempt import FORESEEN, Attempt, made_toolpath
 from pentapod.job.schema.job import Job
@@ -57,6 +57,7 @@ def mended(attempt: Attempt, failed: Outcome) -> Outcome:
     Returns the first outcome that passes, else the failed one.
     """
     whole, program, outcome, mend = attempt.task.toolpath, attempt.withheld(), failed, None
+    runner = attempt.runner
     for _ in range(OPTIONS.rounds):
         before, mend = mend, mend_of(whole, mend, outcome, most_left_out(attempt.task.job))
         if mend is None:
@@ -64,8 +65,10 @@ def mended(attempt: Attempt, failed: Outcome) -> Outcome:
         again = _changed(attempt, outcome, Mend() if before is None else before, mend)
         outcome = again.planned()
         if outcome.passed:
-            attempt.runner.stages = again.runner.stages
+            runner.stages = again.runner.stages
             return outcome
+        if (way := FailedMend.of(outcome)) is not None:
+            runner.stages.append(Stage("failed mend", 0.0, way, f"{mend}. It failed, too{_why(outcome)}"))
     return failed if outcome is failed else attempt.put_back(failed, program)
 
 
@@ -123,9 +126,13 @@ def _otherwise(attempt: Attempt, failed: Outcome, job: Job, words: str, before: 
     if outcome.passed:
         attempt.runner.stages = runner.stages
         return outcome
-    why = "" if outcome.refusal is None else f": {dataclasses.replace(outcome.refusal, remedy='')}"
     attempt.runner.stages += [
-        Stage(ANOTHER_WAY, 0.0, FailedWay.of(outcome), f"{words}. It failed, too{why}"),
-        *(stage for stage in runner.stages if isinstance(stage.value, FailedWay)),
+        Stage(ANOTHER_WAY, 0.0, FailedWay.of(outcome), f"{words}. It failed, too{_why(outcome)}"),
+        *(stage for stage in runner.stages if isinstance(stage.value, FailedWay | FailedMend)),
     ]
     return attempt.put_back(failed, program)
+
+
+def _why(failed: Outcome) -> str:
+    """Return why a run failed, in words after a colon."""
+    return "" if failed.refusal is None else f": {dataclasses.replace(failed.refusal, remedy='')}"

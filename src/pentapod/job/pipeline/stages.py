@@ -17,7 +17,7 @@ from pentapod.job.build.pieces import job_part
 from pentapod.job.build.region import covers_region
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import job_link_style
-from pentapod.job.mending import FailedWay
+from pentapod.job.mending import FailedMend, FailedWay
 from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage
 from pentapod.job.pipeline.attempt import Attempt, Writer, made_toolpath
 from pentapod.job.pipeline.other_attempts import first_that_passes
@@ -94,7 +94,8 @@ def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried],
     otherwise = outcome.find(FailedWay)
     own = frozenset[str]() if otherwise is None else otherwise.claims
     ways = [stage.value for stage in runner.stages if isinstance(stage.value, FailedWay)]
-    left = min((way.left for way in ways if way.left is not None), default=None)
+    lefts = [stage.value.left for stage in runner.stages if isinstance(stage.value, FailedWay | FailedMend)]
+    left = min((each for each in lefts if each is not None), default=None)
     meets = next((way.meets for way in ways if way.meets), ())
     about = (failed, refusal.diagnosis, own, left, meets)
     found = runner.run("advice", lambda: advised(*search, *about, forbidden=forbidden))
