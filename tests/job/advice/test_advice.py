@@ -28,6 +28,7 @@ from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.pipeline.advice_on_errors import can_help
 from pentapod.job.pipeline.run import tried
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
+from pentapod.verify.verdict.verdict import Certificate, Place
 from refused_jobs import REFUSED
 
 TOO_FAR = ("position_mm = [", "position_mm = [1000.0, 0, 700] # [")
@@ -158,6 +159,26 @@ def test_axes_that_leave_too_much_are_not_tried_at_other_places(known, tmp_path)
     assert len(same) == (0 if known else 1)
     axes = [each.axis for each in planned if each.part == job.part and each.tool == job.tool]
     assert len(axes) == len({str(axis) for axis in axes})
+
+
+@pytest.mark.usefixtures("all_fits")
+@pytest.mark.parametrize("claim", [SURFACE_LEFT, "tip deviation"])
+def test_where_its_program_leaves_too_much_set_ups_and_other_tool_lengths_are_not_tried(claim, tmp_path):
+    """They leave as much; where another claim fails, they are tried."""
+
+    def plan(job: Job, _) -> Tried:
+        planned.append(job)
+        return Tried("verdict", failed=frozenset((claim,)))
+
+    planned: list[Job] = []
+    job = Job.load(REFUSED["dome of 60 deg, no cone"].write(tmp_path))
+    machine, mesh = job_machine(job), job_mesh(job)
+    toolpath = job_toolpath(job, mesh, machine=machine)[0]
+    failed = {claim: Certificate(claim, False, 13.0, 0.1, "%", Place(), "")}
+    options = AdviceOptions(plans=12, replans=12, nearer=(), thinner=0.99, surface_points=2000)
+    advised(job, machine, mesh, toolpath, plan, options, silent, failed=failed)
+    lengths = {each.tool.length_mm for each in planned if each.part == job.part} - {job.tool.length_mm}
+    assert bool(lengths) == (claim != SURFACE_LEFT)
 
 
 @pytest.mark.usefixtures("all_fits")

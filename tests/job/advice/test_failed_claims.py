@@ -81,6 +81,15 @@ def test_a_little_that_is_left_may_stay(tmp_path, percent):
     assert trial.words.startswith("at most ")
 
 
+@pytest.mark.parametrize(("percent", "long", "first"), [(0.4, 10**6, True), (1.5, 10**6, False), (1.5, 100, True)])
+def test_what_is_left_comes_first_where_it_is_very_little_or_other_plans_take_long(percent, long, first, tmp_path):
+    _, found, _ = trials(tmp_path, "passes too far apart", surface_left.CLAIMS[0], percent, nearer=(0.3,), long=long)
+    stays = ["left_share" in each.changes.get("tolerance", {}) for each in found]
+    assert sum(stays) == 1
+    assert len(found) > 1
+    assert stays[0] == first
+
+
 @pytest.mark.parametrize(("claim", "percent"), [(surface_left.CLAIMS[0], 13.0), (slowness.CLAIMS[0], 0.5)])
 def test_a_little_that_another_way_leaves_may_stay(tmp_path, claim, percent):
     """Where the run does the job in this way again, its program passes then."""

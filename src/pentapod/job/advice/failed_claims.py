@@ -126,7 +126,8 @@ class FailedClaims:
     def _leaving_less(self) -> Iterator[Trial]:
         """Yield changes that leave less than the job now allows, where that can be estimated."""
         most, accepted = self.options.surely * float(self.job.tolerance.left_share), False
-        if self._accepted <= self.options.hardly:
+        long = len(self.toolpath) > self.options.long
+        if self._accepted <= (self.options.little if long else self.options.hardly):
             yield from self._as_left()
             accepted = True
         for words, changes in self._finer():

@@ -50,7 +50,8 @@ class AdviceOptions(Value):
     diameter (with that distance), and on the feed; surface_points: of the region, at which it is estimated what is
     left; near_share: steps along the toolpath, in radii of the ball; surely: share of what may be left that the
     estimate must keep to; little: share of the region that may stay as it is, where nothing else helps; hardly: that
-    may before anything else is planned; more: what is allowed then, as a multiple of what is left.
+    may before anything else is planned; long: waypoints from which other ways take minutes, so that `little` may
+    before; more: what is allowed then, as a multiple of what is left.
     """
 
     wanted: int = 1
@@ -94,6 +95,7 @@ class AdviceOptions(Value):
     surely: float = 0.8
     hardly: float = 0.005
     little: float = 0.02
+    long: int = 10_000
     more: float = 1.2
 
 
