@@ -1,4 +1,4 @@
-"""Attempt: a job's toolpath planned once, its program judged, its files written."""
+"""Attempt: a job's toolpath planned once, and its program judged; the files of what becomes of a run."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class Attempt:
         return self.refused(refusal)
 
     def planned(self) -> Outcome:
-        """Run the stages after the toolpath and the verification, write the files, and return the outcome."""
+        """Run the stages after the toolpath and the verification, and return the outcome. Only the program is written."""
         file, runner = self.staging / PROGRAM, self.runner
         (self.staging / WITHHELD).unlink(missing_ok=True)
         program = self.task.program(file)
@@ -110,25 +110,29 @@ class Attempt:
             runner.stages.append(Stage("withheld", 0.0, fails))
             file.rename(self.staging / WITHHELD)
             remove_ways(self.staging)
-        return self.written(verdict)
+        return self.ended(verdict)
 
     def refused(self, refusal: Refusal) -> Outcome:
-        """Write the files of a refused run, and return the outcome."""
-        return self.written(refusal_verdict(refusal, self.task.specification.sources))
+        """Return the outcome of a refused run."""
+        return self.ended(refusal_verdict(refusal, self.task.specification.sources))
 
-    def written(self, verdict: Verdict) -> Outcome:
-        """Write the files of a run but its program, and return the outcome."""
-        task, staging = self.task, self.staging
+    def ended(self, verdict: Verdict) -> Outcome:
+        """Return the outcome of a run with its stages till now."""
+        task = self.task
         outcome = Outcome(task.job.asked or task.job, task.machine, tuple(self.runner.stages), verdict)
         if (placed := outcome.find(PlacedPath)) is not None:
             outcome = dataclasses.replace(outcome, machine=task.on(placed.placement).machine)
+        return outcome
+
+    def write(self, outcome: Outcome) -> None:
+        """Write the files of a run but its program."""
+        staging = self.staging
         write_arrays(array_parts(outcome, unstaged(staging)), staging / ARRAYS)
         give_back()
         for name, write in self.writers.items():
             self.runner.progress("report", 0.0, name)
             write(outcome, staging / name)
         write_json(outcome.to_dict(), staging / VERDICT)
-        return outcome
 
     def withheld(self) -> bytes | None:
         """Return the program that failed its verdict; None where none was written."""
@@ -150,12 +154,12 @@ class Attempt:
         return Tried(None, outcome.margin) if verdict.passed else Tried(STAGE, failed=failed)
 
     def put_back(self, failed: Outcome, program: bytes | None) -> Outcome:
-        """Write the files of a failed run again, and its program that was withheld; return the outcome."""
+        """Write the program of a failed run again, which was withheld; return the outcome."""
         file = self.staging / WITHHELD
         file.unlink(missing_ok=True)
         if program is not None:
             file.write_bytes(program)
-        return self.written(failed.verdict)
+        return self.ended(failed.verdict)
 
     def _with_ways(self, program: Program) -> Refusal | None:
         """Make the ways of a program and write them beside it, if the machine has a park pose; or return a refusal."""

@@ -47,7 +47,7 @@ def first_that_passes(attempt: Attempt) -> Outcome:
         outcome = outcome if outcome.passed else mended(attempt, outcome)
         if not outcome.passed:
             runner.stages += ways
-            outcome = attempt.written(outcome.verdict)
+            outcome = attempt.ended(outcome.verdict)
     return outcome
 
 
@@ -122,7 +122,7 @@ def _otherwise(attempt: Attempt, failed: Outcome, job: Job, words: str, before: 
     elif outcome.passed and stands(job):  # what it does not reach
         left = next(each.method for each in outcome.verdict.certificates if each.claim == SURFACE_LEFT)
         runner.stages.append(Stage("left", 0.0, None, f"{SURFACE_LEFT}: {left.rsplit('; ', 1)[-1]}"))
-        outcome = again.written(outcome.verdict)
+        outcome = again.ended(outcome.verdict)
     if outcome.passed:
         attempt.runner.stages = runner.stages
         return outcome

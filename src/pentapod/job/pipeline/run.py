@@ -85,6 +85,7 @@ def run(
         if piece is None and advice is not None:
             again = partial(tried, machine=machine, limits=limits, claims=claims)
             outcome = with_advice(attempt, outcome, again, advice)
+        attempt.write(outcome)
     return outcome
 
 

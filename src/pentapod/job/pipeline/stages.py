@@ -49,8 +49,9 @@ def planned(
     limits: tuple[Limit, ...],
     claims: tuple[Claim, ...],
 ) -> tuple[Attempt, Outcome]:
-    """Plan a job whose mesh was read, write the files into `staging`, and return the attempt and its outcome.
+    """Plan a job whose mesh was read, write its program into `staging`, and return the attempt and its outcome.
 
+    Of a job in several set-ups each has all its files in a folder of its own.
     machine, mesh: those of the job. own_machine: whether the machine is a value of the caller, of no file. Else as in
     `run.run`. Raises InputError.
     """
@@ -101,7 +102,7 @@ def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried],
     found = runner.run("advice", lambda: advised(*search, *about, forbidden=forbidden))
     better = refusal.with_advice(found.advice, found.sentence)
     runner.stages = [s if s.value is not refusal else s.with_value(better) for s in runner.stages]
-    return attempt.written(outcome.verdict) if failed else attempt.refused(better)
+    return attempt.ended(outcome.verdict) if failed else attempt.refused(better)
 
 
 def _split(attempt: Attempt, refusal: Refusal) -> Outcome:
@@ -126,7 +127,9 @@ def _split(attempt: Attempt, refusal: Refusal) -> Outcome:
         folder.mkdir()
         specification = dataclasses.replace(task.specification, toolpath=part, missed=missed)
         own_attempt = attempt.with_task(specification=specification, runner=own, piece=piece)
-        parts.append(SetUp(number, piece, dataclasses.replace(own_attempt, staging=folder).planned()))
+        own_attempt = dataclasses.replace(own_attempt, staging=folder)
+        parts.append(SetUp(number, piece, own_attempt.planned()))
+        own_attempt.write(parts[-1].outcome)
     done = SetUps(tuple(parts), cutting, missed, job.placement.setups)
     runner.stages.append(Stage("set-ups planned", sum(part.seconds for part in parts), done, str(done)))
-    return attempt.written(done.verdict)
+    return attempt.ended(done.verdict)
