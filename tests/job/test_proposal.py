@@ -14,11 +14,12 @@ from pentapod.cli.main import run as run_cli
 from pentapod.job import Job, run
 from pentapod.job.build.placement import job_constraints
 from pentapod.job.build.reach import check_reach
-from pentapod.job.build.region import region_report
+from pentapod.job.build.region import job_region, region_report
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.proposal.proposal import propose
 from pentapod.machine.machine import Machine
+from pentapod.mesh.patch import Patch
 from pentapod.toolpath import SegmentKind
 from slotted_parts import slotted
 
@@ -187,6 +188,16 @@ def test_of_a_part_larger_than_the_machine_a_box_in_its_middle_is_machined(tmp_p
     report = str(region_report(job, job_mesh(job)))
     assert "is outside region_box_mm" in report
     assert any("larger than the work volume" in remark for remark in proposal.remarks)
+
+
+def test_where_the_middle_of_a_large_part_holds_nothing_the_box_is_elsewhere(tmp_path):
+    """A frame of four bars around an opening; before, "no side of this surface can be machined" was said."""
+    bars = [trimesh.creation.box((400, 30, 10)), trimesh.creation.box((30, 340, 10))]
+    moved = [bar.copy().apply_translation(by) for bar, by in zip(bars, ((0, 185, 0), (185, 0, 0)), strict=True)]
+    others = [bar.copy().apply_translation(by) for bar, by in zip(bars, ((0, -185, 0), (-185, 0, 0)), strict=True)]
+    job, proposal = proposed(tmp_path, trimesh.util.concatenate(moved + others))
+    assert Patch.of(job_mesh(job), job_region(job)).areas.sum() > 2000e-6
+    assert any("a box where it holds most is machined" in remark for remark in proposal.remarks)
 
 
 def test_facets_that_do_not_join_are_an_error(tmp_path):

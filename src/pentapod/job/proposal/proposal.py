@@ -67,16 +67,16 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
         table["region_direction"] = [float(v) + 0.0 for v in direction]
         reasons["part", "region_direction"] = "the side that shows most of the surface"
     remarks.append(f"machined from {side}")
-    box = _box(mesh, direction, machine.work)
+    box, where = _box(mesh, direction, machine.work)
     region = Region(box=box, direction=direction)
     patch = Patch.of(mesh, replace(region, angle=0.5 * np.pi))
     if not len(patch.faces):
         raise MeshError("no side of this surface can be machined", file=part, remedy="check the mesh")
     if box is not None:
         table["region_box_mm"] = [[rounded(v) for v in corner] for corner in from_si(box, "mm")]
-        reasons["part", "region_box_mm"] = "the part is larger than the machine's work volume; this is its middle"
+        reasons["part", "region_box_mm"] = f"the part is larger than the machine's work volume; this is {where}"
         remarks.append(
-            "it is larger than the work volume: a box in its middle is machined (region_box_mm), "
+            f"it is larger than the work volume: a box {where} is machined (region_box_mm), "
             f"{100.0 * float(patch.areas.sum() / mesh.facet_areas.sum()):.2g} % of the surface"
         )
     toolpath, cutter = _toolpath(patch, direction), cutter_for(mesh, patch, direction, stands=box is None)
@@ -176,22 +176,36 @@ def _side(mesh: Mesh) -> tuple[str, bool]:
     return ("+z" if OPTIONS.sideways * shown["+z"] >= most else best), False
 
 
-def _box(mesh: Mesh, direction: Floats, work: WorkVolume) -> Floats | None:
-    """Return the box (2, 3) in the middle of a part that the work volume holds; None where it holds the part."""
+def _box(mesh: Mesh, direction: Floats, work: WorkVolume) -> tuple[Floats | None, str]:
+    """Return the box (2, 3) of a part that the work volume holds, and where it is; None where it holds the part.
+
+    It is in the middle, unless it holds much less there than where it holds most of what faces the direction.
+    """
     frame = np.stack([*tangent_frame(direction), direction])
     points = mesh.vertices @ frame.T
     low, high = points.min(axis=0), points.max(axis=0)
     share = min(work.diameter / float((high - low)[:2].max()), 1.0)
     height = min(work.height, high[2] - low[2])
     if share == 1.0 and height == high[2] - low[2]:
-        return None
-    middle, half = 0.5 * (low + high)[:2], 0.5 * share * (high - low)[:2]
+        return None, ""
+    half, where = 0.5 * share * (high - low)[:2], "in its middle"
+    facing = mesh.facet_areas * np.maximum(mesh.facet_normals @ direction, 0.0)
+    places = points[mesh.faces].mean(axis=1)[:, :2]
+    rows = np.linspace((low + 0.5 * share * (high - low))[:2], (high - 0.5 * share * (high - low))[:2], OPTIONS.boxes)
+    middles = [
+        0.5 * (low + high)[:2],
+        *(np.array([x, y]) for x in np.unique(rows[:, 0]) for y in np.unique(rows[:, 1])),
+    ]
+    held = [float(facing[(np.abs(places - middle) <= half).all(axis=1)].sum()) for middle in middles]
+    middle = middles[0]
+    if held[0] < OPTIONS.middle * max(held):
+        middle, where = middles[int(np.argmax(held))], "where it holds most"
     # What lies above the middle; the highest of it is machined.
     near = points[(np.abs(points[:, :2] - middle) <= half).all(axis=1)]
     top = near[:, 2].max() if len(near) else high[2]
     margin = OPTIONS.margin * work.height
     corners = np.array([[*(middle - half), top - height - margin], [*(middle + half), top + margin]]) @ frame
-    return np.sort(corners, axis=0)
+    return np.sort(corners, axis=0), where
 
 
 def _toolpath(patch: Patch, direction: Floats) -> dict[str, Any]:
