@@ -18,8 +18,10 @@ RIDGE = R - np.sqrt(R**2 - 0.25 * STEP**2)
 
 
 def sheet(height, width=0.03, length=0.02, cells=40):
-    """A surface of centres over a rectangle."""
-    x, y = np.meshgrid(np.linspace(0.0, length, cells + 1), np.linspace(0.0, width, cells + 1), indexing="ij")
+    """A surface of centres over a rectangle. cells: number along both sides, or the coordinates along them."""
+    even = isinstance(cells, int)
+    sides = [np.linspace(0.0, size, cells + 1) for size in (length, width)] if even else cells
+    x, y = np.meshgrid(*sides, indexing="ij")
     k = np.arange(x.size).reshape(x.shape)
     a, b, c, d = (q.ravel() for q in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
     points = np.stack([x.ravel(), y.ravel(), height(x, y).ravel()], axis=1)
@@ -75,6 +77,21 @@ def test_only_what_may_be_left_is_looked_at_closely_however_near_the_passes_are(
     assert len(rest_lines(sheet(flat), along_x(ys, flat), R, step, none, closed)) == 0
     rim = 2 * 40 * 3  # between the first pass and the border lies half a stepover
     assert looked[0] <= rim
+
+
+def test_the_ball_dips_into_a_hole_narrower_than_itself_however_finely_the_pit_over_it_is_meshed():
+    """A pass is 0.4 mm beside the axis. The pit has hardly any area, but all of the hole answers for its bottom."""
+    hole = 2.5e-3
+
+    def pit(x, y):
+        return np.sqrt(R**2 - (hole - np.minimum(np.hypot(x - 0.01, y - 0.015), hole)) ** 2)
+
+    even = np.linspace(-1.0, 1.0, 121)
+    patch = sheet(pit, cells=(0.01 + 0.01 * even * np.abs(even), 0.015 + 0.015 * even * np.abs(even)))
+    found = rest_lines(patch, along_x(0.4e-3 + np.arange(0.0, 0.03, STEP), pit), R, STEP, none, closed, 0.5e-3)
+    (dip,) = (k for k in range(len(found)) if np.abs(found.points[found.rows(k)][:, 1] - 0.015).max() < hole)
+    assert found.lengths[dip] > 0.5 * STEP
+    assert np.hypot(*(found.points[found.rows(dip)][:, :2] - [0.01, 0.015]).T).min() < 0.1e-3
 
 
 def test_passes_wider_apart_than_the_ball_are_meant_so():

@@ -19,6 +19,7 @@ from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.runs import members
 from pentapod.mesh.passes import Passes
+from pentapod.mesh.normals import corner_angles
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.topology import components
 
@@ -34,8 +35,8 @@ class RestOptions:
     are looked at first; edge: of the facets that are looked at again, in stepovers. sample, along: largest distance of
     the points that stand for a pass, in radii, and in halves of the stepover: else what lies between two passes seems
     farther from both. bent: angle between facets, radians, from which directions between their normals are looked at;
-    folded: from which there are none. negligible: share of the area that rest without lines may have in total. rounds:
-    of lines. rings: facets around rest through which its line may run. core: share of the most that is left from which
+    folded: from which there are none. negligible: share of the area that rest without lines may have in total, with what
+    the ball touches from its vertices. rounds: of lines. rings: facets around rest through which its line may run. core: share of the most that is left from which
     a line begins and ends. shortest: line, in stepovers; shorter ones run through all of their piece. smoothing: rounds
     in which points of a line are averaged with both neighbours.
     """
@@ -81,12 +82,13 @@ def rest_lines(
         return Passes.joined([])
     coarse = _left(patch, rising(patch), KDTree(centres), radius, options.coarse * height, options) > 0.0
     coarse[coarse] = ~hides(patch.vertices[patch.faces[coarse]].mean(axis=1))
-    near = patch.only(_grown(patch, coarse, 1)).refined(options.edge * stepover)
+    near = patch.only(_about(patch, _grown(patch, coarse, 1), options.shortest * stepover))
+    near = near.refined(options.edge * stepover)
     ends = rising(near)
     for _ in range(options.rounds):
         left = _left(near, ends, KDTree(centres), radius, height, options)
         left[left > 0.0] *= ~hides(near.vertices[near.faces[left > 0.0]].mean(axis=1))
-        lines = _lines(near, left, options.negligible * whole, options.shortest * stepover, options)
+        lines = _lines(near, left, radius, options.negligible * whole, options.shortest * stepover, options)
         if not len(lines):
             break
         parts.append(lines)
@@ -176,7 +178,30 @@ def _grown(patch: Patch, wanted: Bools, rings: int) -> Bools:
     return wanted
 
 
-def _lines(patch: Patch, left: Floats, negligible: float, shortest: float, options: RestOptions) -> Passes:
+def _about(patch: Patch, wanted: Bools, reach: float) -> Bools:
+    """Return the facets (F,) that are wanted, or whose middles are within `reach` metres of those of one."""
+    middles = patch.vertices[patch.faces].mean(axis=1)
+    if not wanted.any():
+        return wanted
+    return np.asarray(KDTree(middles[wanted]).query(middles, distance_upper_bound=reach)[0]) < np.inf
+
+
+def _spread(patch: Patch, radius: float) -> Floats:
+    """Return the area (V,) of the ball that touches the part from each vertex, as far as its facets leave it open.
+
+    At the bottom of a pit, such as over a hole narrower than the ball, that is much, though the pit has hardly any
+    area. By the theorem of Gauss and Bonnet the normals about a vertex span what its angles lack of a full turn.
+    """
+    topology, faces = patch.topology, patch.faces
+    around = np.bincount(faces.ravel(), corner_angles(patch.vertices, faces).ravel(), len(patch.vertices))
+    lacks = np.maximum(2.0 * np.pi - around, 0.0)
+    lacks[topology.edges[topology.facets_at_edge != 2]] = 0.0
+    return radius**2 * lacks
+
+
+def _lines(
+    patch: Patch, left: Floats, radius: float, negligible: float, shortest: float, options: RestOptions
+) -> Passes:
     """Return a line through each connected piece of the facets on which something is left (F,)."""
     rest = left > 0.0
     if not rest.any():
@@ -184,9 +209,12 @@ def _lines(patch: Patch, left: Floats, negligible: float, shortest: float, optio
     grown = _grown(patch, rest, options.rings)
     faces = patch.faces[grown]
     sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+    every = np.stack([patch.faces, np.roll(patch.faces, -1, axis=1)], axis=-1).reshape(-1, 2)
     piece = components(len(patch.vertices), *sides.T)[1]
     owner = piece[patch.faces[:, 0]]
     area = np.bincount(owner[rest], weights=patch.areas[rest], minlength=int(piece.max()) + 1)
+    at = np.unique(patch.faces[rest])
+    area += np.bincount(piece[at], weights=_spread(patch, radius)[at], minlength=len(area))
     order = np.argsort(area, kind="stable")
     needed = order[np.cumsum(area[order]) > negligible]
     height = np.zeros(len(patch.vertices))
@@ -197,6 +225,10 @@ def _lines(patch: Patch, left: Floats, negligible: float, shortest: float, optio
     found: list[tuple[Floats, Floats]] = []
     for one in needed[area[needed] > 0.0].tolist():
         own = sides[piece[sides[:, 0]] == one]
+        if np.ptp(patch.vertices[own].reshape(-1, 3), axis=0).max() < shortest:
+            top = own.ravel()[height[own].argmax()]
+            around = np.linalg.norm(patch.vertices - patch.vertices[top], axis=1) <= shortest
+            own = np.concatenate([own, every[around[every].all(axis=1)]])
         line = _middle_line(patch.vertices, own, height, shortest, options)
         points = patch.vertices[line]
         for _ in range(options.smoothing):
@@ -209,7 +241,8 @@ def _lines(patch: Patch, left: Floats, negligible: float, shortest: float, optio
 def _middle_line(vertices: Floats, sides: Ints, height: Floats, shortest: float, options: RestOptions) -> Ints:
     """Return the vertices (n,) of a line from end to end of a piece, given by its sides (S, 2), where most is left.
 
-    It is at least `shortest` metres long where the piece allows it.
+    It is at least `shortest` metres long where the piece allows it; one that would be shorter leads through the place
+    where most is left.
     """
     used, index = np.unique(sides, return_inverse=True)
     a, b = index.reshape(sides.shape).T
@@ -219,16 +252,20 @@ def _middle_line(vertices: Floats, sides: Ints, height: Floats, shortest: float,
     cost = length / np.maximum(0.5 * (height[used[a]] + height[used[b]]) / most, 0.1)
     plain, weighed = (_graph(a, b, weights, len(used)) for weights in (length, cost))
     inner = height[used] >= options.core * most
-    first = _farthest(plain, int(height[used].argmax()), inner)
+    top = int(height[used].argmax())
+    first = via = _farthest(plain, top, inner)
     last = _farthest(plain, first, inner)
     if float(dijkstra(plain, directed=False, indices=first)[last]) < shortest:
-        first = _farthest(plain, first, inner | True)
+        first, via = _farthest(plain, top, inner | True), top
         last = _farthest(plain, first, inner | True)
-    _, before = dijkstra(weighed, directed=False, indices=first, return_predecessors=True)
-    line = [last]
-    while line[-1] != first:
-        line.append(int(before[line[-1]]))
-    return used[line]
+    _, before = dijkstra(weighed, directed=False, indices=via, return_predecessors=True)
+    ways: list[list[int]] = []
+    for end in (first, last):
+        way = [end]
+        while way[-1] != via:
+            way.append(int(before[way[-1]]))
+        ways.append(way)
+    return used[[*ways[0], *ways[1][-2::-1]]]
 
 
 def _graph(a: Ints, b: Ints, weights: Floats, count: int) -> csr_array:
