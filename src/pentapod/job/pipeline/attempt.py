@@ -95,7 +95,7 @@ class Attempt:
         return self.refused(refusal)
 
     def planned(self) -> Outcome:
-        """Run the stages after the toolpath and the verification, and return the outcome. Only the program is written."""
+        """Run the stages after the toolpath and the verification; write the program, and return the outcome."""
         file, runner = self.staging / PROGRAM, self.runner
         (self.staging / WITHHELD).unlink(missing_ok=True)
         program = self.task.program(file)

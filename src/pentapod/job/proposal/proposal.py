@@ -191,11 +191,9 @@ def _box(mesh: Mesh, direction: Floats, work: WorkVolume) -> tuple[Floats | None
     half, where = 0.5 * share * (high - low)[:2], "in its middle"
     facing = mesh.facet_areas * np.maximum(mesh.facet_normals @ direction, 0.0)
     places = points[mesh.faces].mean(axis=1)[:, :2]
-    rows = np.linspace((low + 0.5 * share * (high - low))[:2], (high - 0.5 * share * (high - low))[:2], OPTIONS.boxes)
-    middles = [
-        0.5 * (low + high)[:2],
-        *(np.array([x, y]) for x in np.unique(rows[:, 0]) for y in np.unique(rows[:, 1])),
-    ]
+    first, last = (low + 0.5 * share * (high - low))[:2], (high - 0.5 * share * (high - low))[:2]
+    rows, columns = (np.unique(each) for each in np.linspace(first, last, OPTIONS.boxes).T)
+    middles = [0.5 * (low + high)[:2], *(np.array([x, y]) for x in rows for y in columns)]
     held = [float(facing[(np.abs(places - middle) <= half).all(axis=1)].sum()) for middle in middles]
     middle = middles[0]
     if held[0] < OPTIONS.middle * max(held):

@@ -18,8 +18,8 @@ from scipy.spatial import KDTree
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.runs import members
-from pentapod.mesh.passes import Passes
 from pentapod.mesh.normals import corner_angles
+from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.topology import components
 
@@ -35,10 +35,11 @@ class RestOptions:
     are looked at first; edge: of the facets that are looked at again, in stepovers. sample, along: largest distance of
     the points that stand for a pass, in radii, and in halves of the stepover: else what lies between two passes seems
     farther from both. bent: angle between facets, radians, from which directions between their normals are looked at;
-    folded: from which there are none. negligible: share of the area that rest without lines may have in total, with what
-    the ball touches from its vertices. rounds: of lines. rings: facets around rest through which its line may run. core: share of the most that is left from which
-    a line begins and ends. shortest: line, in stepovers; shorter ones run through all of their piece. smoothing: rounds
-    in which points of a line are averaged with both neighbours.
+    folded: from which there are none. negligible: share of the area that rest without lines may have in total, with
+    what the ball touches from its vertices. rounds: of lines. rings: facets around rest through which its line may run.
+    core: share of the most that is left from which a line begins and ends. shortest: line, in stepovers; shorter ones
+    run through all of their piece, and what lies about it. smoothing: rounds in which points of a line are averaged
+    with both neighbours.
     """
 
     allowed: float = 1.25
