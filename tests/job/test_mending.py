@@ -14,7 +14,7 @@ from pentapod.job import Job, run, task
 from pentapod.job.build.pieces import job_without, program_toolpath
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_mesh
-from pentapod.job.mending import FailedMend, mend_of, most_left_out
+from pentapod.job.mending import FailedMend, mend_of, more_left_out, most_left_out
 from pentapod.job.outcome import Outcome, Stage
 from pentapod.job.pipeline import attempt
 from pentapod.machine.machine import Machine
@@ -138,6 +138,20 @@ def test_no_cut_may_be_left_out_where_nothing_judges_what_is_left(dome):
     assert most_left_out(wide) == 0.05
     lines = {**TABLES, "toolpath": {"strategy": "edges"}}
     assert most_left_out(Job.from_dict(lines, job.mesh_path.parent)) == 0.0
+
+
+def test_advice_gets_how_much_more_than_a_run_leaves_out_by_itself_is_out_of_limits(dome):
+    job, _, whole = dome
+    few = outcome(job, whole, refused((120, 130)))
+    share = mend_of(whole, None, few, 1.0).share
+    assert most_left_out(job) < share < 0.05
+    assert more_left_out(job, whole, few, 0.05) == share
+    assert more_left_out(job, whole, few, 0.9 * share) is None
+    tolerant = Job.from_dict({**TABLES, "tolerance": {"left_share": share}}, job.mesh_path.parent)
+    assert more_left_out(tolerant, whole, few, 0.05) is None
+    lines = {**TABLES, "toolpath": {"strategy": "edges"}}
+    assert more_left_out(Job.from_dict(lines, job.mesh_path.parent), whole, few, 0.05) is None
+    assert more_left_out(job, whole, replace(few, stages=few.stages[:1]), 0.05) is None
 
 
 def test_a_program_that_says_it_leaves_out_much_is_refused(dome, tmp_path):

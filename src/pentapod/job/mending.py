@@ -154,6 +154,18 @@ def most_left_out(job: Job, options: MendOptions = OPTIONS) -> float:
     return min(options.most * job.tolerance.left_share, options.ever)
 
 
+def more_left_out(job: Job, whole: Toolpath, outcome: Outcome, most: float) -> float | None:
+    """Return the share of its cuts at which a job's placement exceeds limits, up to `most`.
+
+    None where it is more, or so little that a run leaves it out by itself, or where no claim judges what is left.
+    """
+    own = most_left_out(job)
+    if own == 0.0 or outcome.refusal is None or outcome.refusal.stage != "placement":
+        return None
+    mend = mend_of(whole, None, outcome, most)
+    return mend.share if mend is not None and mend.share > own else None
+
+
 def other_way(
     job: Job, outcome: Outcome, before: Outcome | None = None, options: MendOptions = OPTIONS
 ) -> tuple[Job, str] | None:

@@ -162,6 +162,25 @@ def test_axes_that_leave_too_much_are_not_tried_at_other_places(known, tmp_path)
 
 
 @pytest.mark.usefixtures("all_fits")
+@pytest.mark.parametrize(("leaves", "share"), [(0.009, 0.011), (None, None)])
+def test_that_the_few_places_out_of_limits_are_left_out_is_planned_first_and_besides_all_else(leaves, share, tmp_path):
+    def plan(job: Job, _) -> Tried:
+        planned.append(job)
+        return Tried("placement")
+
+    planned: list[Job] = []
+    job = Job.load(REFUSED["dome of 60 deg, no cone"].write(tmp_path))
+    machine, mesh = job_machine(job), job_mesh(job)
+    toolpath = job_toolpath(job, mesh, machine=machine)[0]
+    short = [Shortfall("leg 1 too long", ((0, 1),), 1.0, "mm")]
+    advised(job, machine, mesh, toolpath, plan, AdviceOptions(plans=2), silent, short=short, leaves=leaves)
+    own = job.tolerance.left_share
+    assert [each.tolerance.left_share for each in planned] == [own if share is None else share, own, own][
+        : 2 + bool(share)
+    ]
+
+
+@pytest.mark.usefixtures("all_fits")
 @pytest.mark.parametrize("claim", [SURFACE_LEFT, "tip deviation"])
 def test_where_its_program_leaves_too_much_set_ups_and_other_tool_lengths_are_not_tried(claim, tmp_path):
     """They leave as much; where another claim fails, they are tried."""

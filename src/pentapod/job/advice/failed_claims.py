@@ -47,6 +47,7 @@ class FailedClaims:
     """Trials for the claims of a job that fail, by name. toolpath: the job's, which its program follows.
 
     left: percent of the region that is left where a run does the job in another way, if nothing else fails there.
+    leaves: share of the cuts at the few places where its placement exceeds limits, if a run would not leave them out.
     """
 
     job: Job
@@ -57,6 +58,7 @@ class FailedClaims:
     options: AdviceOptions
     tell: Tell
     left: float | None = None
+    leaves: float | None = None
 
     def all(self) -> Iterator[Trial]:
         """Yield trials, the ones that keep most first. What gouges fails any verdict, so it is left out at once."""
@@ -70,6 +72,8 @@ class FailedClaims:
             yield from self._leaving_less()
         else:
             yield from self._as_left()
+        if self.leaves is not None:
+            yield self._staying(_longer(self.options.more * self.leaves))
 
     def upright(self) -> Iterator[Trial]:
         """Yield the job without what a ball reaches only under an overhang, where the tool touches the part."""
@@ -152,9 +156,13 @@ class FailedClaims:
         """Yield the program as it is, where nothing but a little that is left on the surface stands against it."""
         share = self._accepted
         if share <= self.options.little:
-            words = f"at most {100.0 * share:.3g} % of the region stays as it is"
-            self.tell(words)
-            yield Trial(words, {"tolerance": {"left_share": share}}, 1.0 - share, 1.0 - share)
+            yield self._staying(share)
+
+    def _staying(self, share: float) -> Trial:
+        """Return the change by which a share of the region may stay as it is."""
+        words = f"at most {100.0 * share:.3g} % of the region stays as it is"
+        self.tell(words)
+        return Trial(words, {"tolerance": {"left_share": share}}, 1.0 - share, 1.0 - share)
 
     @property
     def _accepted(self) -> float:

@@ -80,6 +80,7 @@ def advised(
     meets: tuple[float, ...] = (),
     *,
     forbidden: bool = False,
+    leaves: float | None = None,
 ) -> Advised:
     """Return changes with which a job that cannot be done is planned, and its verdict passes.
 
@@ -87,13 +88,14 @@ def advised(
     short: limits that its placement exceeds; otherwise: claims that fail where it is planned in another way;
     left: percent of the region that one of these ways leaves, where nothing else fails; meets: heights as of
     `met_below` in one of them.
-    forbidden: whether shank or holder forbid what its ball reaches.
+    forbidden: whether shank or holder forbid what its ball reaches. leaves: share of its cuts at the few places where
+    its placement exceeds limits; that they are left out is tried besides all else.
     """
     found: list[Advice] = []
     tried: dict[str, None] = {}
     reasons: dict[str, None] = {}
     # A plan that goes back for another way is two.
-    count, interrupted = options.replans if failed or otherwise else options.plans, False
+    count, interrupted = (options.replans if failed or otherwise else options.plans) + (leaves is not None), False
     ended: list[Tried | None] = [None]
     shown = _Shown(progress, count)
     progress("advice", 0.0, "changes of the job are tried; Ctrl-C ends the search")
@@ -112,7 +114,7 @@ def advised(
     )  # fmt: skip
     trials = _trials(job, machine, mesh, toolpath, options, tell, own, partial(Trials, because=because, ended=last))
     if toolpath is not None:
-        claims = FailedClaims(job, machine, mesh, toolpath, failed, options, tell, left)
+        claims = FailedClaims(job, machine, mesh, toolpath, failed, options, tell, left, leaves)
         touches = any(each.constraint.startswith(TOUCHES) for each in short)
         # Where it may, a run has planned an upright tool by itself.
         upright = touches and not may_stand(job)

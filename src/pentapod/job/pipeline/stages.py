@@ -17,7 +17,7 @@ from pentapod.job.build.pieces import job_part
 from pentapod.job.build.region import covers_region
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import job_link_style
-from pentapod.job.mending import FailedMend, FailedWay
+from pentapod.job.mending import FailedMend, FailedWay, more_left_out
 from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage
 from pentapod.job.pipeline.attempt import Attempt, Writer, made_toolpath
 from pentapod.job.pipeline.other_attempts import first_that_passes
@@ -99,7 +99,8 @@ def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried],
     left = min((each for each in lefts if each is not None), default=None)
     meets = next((way.meets for way in ways if way.meets), ())
     about = (failed, refusal.diagnosis, own, left, meets)
-    found = runner.run("advice", lambda: advised(*search, *about, forbidden=forbidden))
+    leaves = more_left_out(task.job, task.toolpath, outcome, options.little / options.more)
+    found = runner.run("advice", lambda: advised(*search, *about, forbidden=forbidden, leaves=leaves))
     better = refusal.with_advice(found.advice, found.sentence)
     runner.stages = [s if s.value is not refusal else s.with_value(better) for s in runner.stages]
     return attempt.ended(outcome.verdict) if failed else attempt.refused(better)
