@@ -59,7 +59,7 @@ class MendOptions:
     helps: passes come nearer together once more only if what is left fell below this share of what was left before.
     """
 
-    rounds: int = 3
+    rounds: int = 5
     around: float = 0.5e-3
     most: float = 4.0
     ever: float = 0.05
