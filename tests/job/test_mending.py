@@ -179,7 +179,9 @@ def test_a_mend_after_which_too_much_is_left_is_told_and_may_be_advised(dome, tm
     left = Certificate(SURFACE_LEFT, False, 0.3, 0.1, "%", Place(), "")
     monkeypatch.setattr(task.Task, "program", program)
     monkeypatch.setattr(attempt, "judged", lambda *_, **__: Verdict((left,)))
-    done = run(job, tmp_path / "out", advice=None)
+    told = []
+    done = run(job, tmp_path / "out", writers={"told": lambda _, path: told.append(path.touch())}, advice=None)
+    assert len(told) == 1  # of the run, not of each attempt
     assert done.refusal.stage == "placement"
     assert done.find(FailedMend) == FailedMend(0.3)
     (said,) = (stage.remark for stage in done.stages if isinstance(stage.value, FailedMend))

@@ -181,9 +181,9 @@ def _grown(patch: Patch, wanted: Bools, rings: int) -> Bools:
 
 def _about(patch: Patch, wanted: Bools, reach: float) -> Bools:
     """Return the facets (F,) that are wanted, or whose middles are within `reach` metres of those of one."""
-    middles = patch.vertices[patch.faces].mean(axis=1)
     if not wanted.any():
         return wanted
+    middles = patch.vertices[patch.faces].mean(axis=1)
     return np.asarray(KDTree(middles[wanted]).query(middles, distance_upper_bound=reach)[0]) < np.inf
 
 
@@ -208,9 +208,8 @@ def _lines(
     if not rest.any():
         return Passes.of([])
     grown = _grown(patch, rest, options.rings)
-    faces = patch.faces[grown]
-    sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-    every = np.stack([patch.faces, np.roll(patch.faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+    of_facets = np.stack([patch.faces, np.roll(patch.faces, -1, axis=1)], axis=-1)
+    sides, every = of_facets[grown].reshape(-1, 2), of_facets.reshape(-1, 2)
     piece = components(len(patch.vertices), *sides.T)[1]
     owner = piece[patch.faces[:, 0]]
     area = np.bincount(owner[rest], weights=patch.areas[rest], minlength=int(piece.max()) + 1)
