@@ -122,3 +122,15 @@ def test_while_it_stands_at_the_start_it_is_at_the_start():
     found = crowd(np.linspace(0.0, 2.0, 3001), stands=100)
     assert (found.places[:100] == 0.0).all()
     assert found.distances.max() <= 2e-3
+
+
+def test_a_motion_that_leaves_the_path_is_matched_beside_it_within_a_bound_of_cells():
+    """The search begins anew each time it widens the radius: all of it together is bounded."""
+    motion = course(np.linspace(0.0, 1.0, 501) ** 2)
+    motion.points[240:260, 1] += 8.0  # metres, for a tolerance of one
+    path = course(np.linspace(0.0, 1.0, 301))
+    found = match(motion, path, 1.0)
+    np.testing.assert_allclose(found.arcs[:200], np.linspace(0.0, 1.0, 501)[:200] ** 2, atol=5e-3)
+    few = match(motion, path, 1.0, options=MatchOptions(search=FreeSpaceOptions(widened=1, each=0)))
+    travelled = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(motion.points, axis=0), axis=1)))
+    np.testing.assert_allclose(few.arcs, travelled / travelled[-1], atol=5e-3)

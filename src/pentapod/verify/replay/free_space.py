@@ -15,11 +15,14 @@ from pentapod.geometry.polyline import arc_length
 class FreeSpaceOptions:
     """Limits of a search in the free-space diagram.
 
-    cells: that one search may look at, of five bytes each; the default takes about ten seconds. rounds, window: of the
-    search that widens the radius where the motion leaves the path: how often, and how many samples at first.
+    cells: that one search may look at, of five bytes each; a million take a second at most. rounds, window: of the
+    search that widens the radius where the motion leaves the path: how often, and how many samples at first. In all
+    these rounds it may look at `widened` cells, and `each` more for each sample.
     """
 
     cells: int = 150_000_000
+    widened: int = 10_000_000
+    each: int = 16
     rounds: int = 40
     window: int = 32
 
@@ -83,7 +86,7 @@ class FreeSpace:
         None where there is none, or the diagram is too large. by_axis: also within the bound of the axes. more: metres
         added to the radius where axes have a weight.
         """
-        return self._search(radius, by_axis=by_axis, more=more)[1]
+        return self._search(radius, by_axis=by_axis, more=more)[-1]
 
     def largest(self, pairing: Pairing, distances: Floats, waypoint_distances: Floats) -> float:
         """Return the largest of distances (M,) and (n,), each with the deviation of the motion from its chord.
@@ -102,12 +105,14 @@ class FreeSpace:
     def patched(self, radius: float) -> Pairing | None:
         """Return a matching within the radius, which is widened where the motion leaves the path.
 
-        None where that would need too much memory.
+        None where that would need too many cells.
         """
         radii, wide, window, last = np.full(self._samples - 1, radius), radius, self._options.window, -1
+        left = self._options.widened + self._options.each * self._samples
         for _ in range(self._options.rounds):
-            reached, found = self._search(radii, by_axis=False)
-            if found is not None or reached < 0:
+            reached, cells, found = self._search(radii, by_axis=False, most=left)
+            left -= cells
+            if found is not None or reached < 0 or left <= 0:
                 return found
             # Where the search advanced, the window is too short; where it did not, the radius is too small.
             window *= 2
@@ -128,12 +133,13 @@ class FreeSpace:
         highest[0], lowest[-1] = 0.0, waypoints[-1]
         return Pairing(intervals, lowest, highest, times, 0.0)
 
-    def _search(self, radii: Floats | float, *, by_axis: bool, more: float = 0.0) -> tuple[int, Pairing | None]:
-        """Return the number of samples that are reached within radii (M − 1,), −1 for too many cells; and the matching.
+    def _search(
+        self, radii: Floats | float, *, by_axis: bool, more: float = 0.0, most: int | None = None
+    ) -> tuple[int, int, Pairing | None]:
+        """Return how many samples are reached within radii (M − 1,), how many cells were looked at, and the matching.
 
-        One radius stands for all.
-
-        The matching is None unless all samples are reached.
+        One radius stands for all. most: cells to be looked at; for more −1 samples are reached. The matching is None
+        unless all samples are reached.
         """
         from pentapod.verify.replay import free_space_kernels as kernels  # noqa: PLC0415  compiled: only where used
 
@@ -142,10 +148,11 @@ class FreeSpace:
         np.minimum(at_samples[1:], near, out=at_samples[1:])
         bounds = (near, at_samples, more, self._turns if by_axis else np.full(len(self._turns), np.inf))
         reached, routed, spare, cells = kernels.walk(
-            self._motion, self._path, bounds, self._weights, self._options.cells
+            self._motion, self._path, bounds, self._weights, self._options.cells if most is None else min(most, self._options.cells)
         )
+        count = int(cells[0].max())
         if reached < self._samples:
-            return reached, None
+            return reached, count, None
         intervals, chords = np.empty(self._samples, dtype=np.intp), np.empty(self._waypoints, dtype=np.intp)
         kernels.trace(cells, routed, intervals, chords)
         del cells  # as large as what is made now
@@ -157,7 +164,7 @@ class FreeSpace:
         samples[0], samples[-1] = 0.0, self._waypoints - 1.0
         waypoints[0], waypoints[-1] = 0.0, self._samples - 1.0
         times = _ordered(waypoints[:, 2], waypoints[:, 0], waypoints[:, 1])
-        return reached, Pairing(intervals, samples[:, 0], samples[:, 1], times, max(float(np.max(radii)) + spare, 0.0))
+        return reached, count, Pairing(intervals, samples[:, 0], samples[:, 1], times, max(float(np.max(radii)) + spare, 0.0))
 
 
 def _curve(line: PosedPolyline) -> tuple[Floats, Floats]:
