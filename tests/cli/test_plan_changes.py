@@ -37,7 +37,7 @@ def test_the_job_of_other_values_stays_as_long_as_the_run_is_of_them(make_job, t
 
 def test_a_part_far_outside_the_work_volume_is_told(usual_run, make_job, tmp_path, capsys):
     """A table's height is easily mistyped, and the machine may still reach the part."""
-    job, told = make_job(), "outside the machine's work volume"
+    job, told = make_job(), "outside the machine's work volume; is its place right?"
     assert not any(told in stage.remark for stage in usual_run[2].stages)
     assert run(["plan", str(job), "-o", str(tmp_path / "b"), "--set", "placement.position_mm=[85, -17, 330]"]) == 0
     assert told in capsys.readouterr().out

@@ -48,6 +48,14 @@ STRAIGHT = "the tool keeps one direction, because it would touch the part"
 LEANS_DEG = 0.05
 """Lean of a part from which it is told that it needs a wedge."""
 
+RIGHT_PLACE = {
+    "free": "box_mm keeps it near",
+    "table": "is table_z_mm right? table_x_mm and table_y_mm bound where the part stands",
+    "fixture": "are poses_mm_deg right?",
+    "fixed": "is its place right?",
+}
+"""What is said of a path far outside the work volume, by the mode of the placement."""
+
 FAR_OUTSIDE = 0.5
 """Distance of a path from the work volume, by the volume's diameter, beyond which it is told."""
 
@@ -66,11 +74,11 @@ def explanation(
     return explain(trajectory, machine, uses, slow)
 
 
-def placement_remarks(placed: PlacedPath | Refusal, work: WorkVolume, *, free: bool) -> str:
+def placement_remarks(placed: PlacedPath | Refusal, work: WorkVolume, mode: str) -> str:
     """Return the positions of guides, a common direction of the tool, and what the choice of placement has to tell.
 
-    A path far outside the work volume is no error where it keeps all limits; but a height may be mistyped. free:
-    whether the part may lean as it likes; then it is told that it does.
+    A path far outside the work volume is no error where it keeps all limits; but a height may be mistyped. mode: of the
+    placement; where the part may lean as it likes it is told that it does.
     """
     if isinstance(placed, Refusal):
         return ""
@@ -80,16 +88,14 @@ def placement_remarks(placed: PlacedPath | Refusal, work: WorkVolume, *, free: b
     if any(word in chosen.chosen_by for word in (INTERRUPTED, UPRIGHT, STRAIGHT)):
         lines.append(f"placement: {chosen.chosen_by}; smallest margin {placed.smallest_margin:.3f}")
     lean = from_si(float(np.arccos(min(float(np.abs(chosen.transform.rotation[2]).max()), 1.0))), "deg")
-    if free and lean > LEANS_DEG:
+    if mode == "free" and lean > LEANS_DEG:
         lines.append(
             f'  note: the part leans by {lean:.1f} deg, on a wedge: [placement] mode = "table" keeps it flat on a table'
         )
     outside = work.outside(placed.tips)
     if outside > FAR_OUTSIDE * work.diameter:
         far = f"{from_si(outside, 'mm'):.0f} mm"
-        lines.append(
-            f"  note: the path is up to {far} outside the machine's work volume; is its place, or table_z_mm, right?"
-        )
+        lines.append(f"  note: the path is up to {far} outside the machine's work volume; {RIGHT_PLACE[mode]}")
     return "\n".join(lines)
 
 
@@ -131,7 +137,7 @@ class Task:
         """Plan, write the program to `file` and return it; or return the first refusal."""
         placed = self.placed
         if placed is None:
-            told = partial(placement_remarks, work=self.machine.work, free=self.job.placement.mode == "free")
+            told = partial(placement_remarks, work=self.machine.work, mode=self.job.placement.mode)
             placed = self.runner.run("placement", self._placed, remark=told)
         if isinstance(placed, Refusal):
             return placed
