@@ -23,7 +23,7 @@ from pentapod.machine.machine import Machine
 
 if TYPE_CHECKING:
     from pentapod.job.outcome import Outcome
-    from pentapod.job.pipeline.attempt import Writer
+    from pentapod.job.pipeline.attempt import Attempt, Writer
     from pentapod.job.plan_before import PlanBefore
     from pentapod.timing import Limit
     from pentapod.toolpath.linking.partition import Piece
@@ -61,41 +61,62 @@ def run(
     """
     folder = Path(out)
     check_folder(folder)
+    with staged(folder) as staging:  # from the start: a second run on the folder fails at once
+        attempt, outcome = _attempted(
+            job, staging, progress, machine=machine, piece=piece, before=before, writers=writers,
+            limits=tuple(limits), claims=tuple(claims),
+        )  # fmt: skip
+        if piece is None and advice is not None:
+            # Loaded already: slow, and not for a part that cannot fit.
+            from pentapod.job.pipeline.stages import with_advice  # noqa: PLC0415
+
+            again = partial(tried, machine=machine, limits=tuple(limits), claims=tuple(claims))
+            outcome = with_advice(attempt, outcome, again, advice)
+        attempt.write(outcome)
+    return outcome
+
+
+def _attempted(
+    job: Job,
+    staging: Path,
+    progress: Progress,
+    *,
+    machine: Machine | None = None,
+    piece: Piece | None = None,
+    before: PlanBefore | None = None,
+    writers: Mapping[str, Writer] | None = None,
+    limits: tuple[Limit, ...] = (),
+    claims: tuple[Claim, ...] = (),
+) -> tuple[Attempt, Outcome]:
+    """Plan a job, write its program into `staging`, and return the attempt and its outcome. Else as `run`."""
     if before is not None:
         # Loads what a part that cannot fit does not need.
         from pentapod.job.build.other_ways import as_made  # noqa: PLC0415
 
         job = as_made(job, before.made_from)
     runner = StageRunner(progress)
-    with staged(folder) as staging:  # from the start: a second run on the folder fails at once
-        used = job_machine(job, machine)
-        mesh = runner.run("mesh", lambda: job_mesh(job, progress), remark=lambda mesh: str(mesh.diagnosis))
-        check_reach(job, used, mesh)
-        # Slow, and not for a part that cannot fit.
-        from pentapod.job.advice.wide_parts import check_wide_part  # noqa: PLC0415
-        from pentapod.job.pipeline.stages import planned, with_advice  # noqa: PLC0415
+    used = job_machine(job, machine)
+    mesh = runner.run("mesh", lambda: job_mesh(job, progress), remark=lambda mesh: str(mesh.diagnosis))
+    check_reach(job, used, mesh)
+    # Slow, and not for a part that cannot fit.
+    from pentapod.job.advice.wide_parts import check_wide_part  # noqa: PLC0415
+    from pentapod.job.pipeline.stages import planned  # noqa: PLC0415
 
-        if piece is None and before is None:
-            check_wide_part(job, used, mesh)
-
-        attempt, outcome = planned(
-            job, used, mesh, runner, staging, writers or {}, own_machine=machine is not None,
-            piece=piece, before=before, limits=tuple(limits), claims=tuple(claims),
-        )  # fmt: skip
-        if piece is None and advice is not None:
-            again = partial(tried, machine=machine, limits=limits, claims=claims)
-            outcome = with_advice(attempt, outcome, again, advice)
-        attempt.write(outcome)
-    return outcome
+    if piece is None and before is None:
+        check_wide_part(job, used, mesh)
+    return planned(
+        job, used, mesh, runner, staging, writers or {}, own_machine=machine is not None,
+        piece=piece, before=before, limits=limits, claims=claims,
+    )  # fmt: skip
 
 
 def tried(job: Job, progress: Progress = silent, **given: Any) -> Tried:
-    """Return how the plan of a job ends. Nothing of it is kept. given: as for `run`.
+    """Return how the plan of a job ends. Nothing of it is kept. given: machine, limits and claims as for `run`.
 
     Raises InputError as `run`, and KeyboardInterrupt where it would go on with the best that a search found till then.
     """
     with tempfile.TemporaryDirectory() as folder:
-        outcome = run(job, folder, ending_when_interrupted(progress), advice=None, **given)
+        _, outcome = _attempted(job, Path(folder), ending_when_interrupted(progress), **given)
     if outcome.passed:
         return Tried(None, outcome.margin)
     # Loaded by the run.
