@@ -39,6 +39,7 @@ from pentapod.job.stage_runner import StageRunner
 from pentapod.job.task import Task
 from pentapod.machine.machine import Machine
 from pentapod.mesh.io.stl import write_stl
+from pentapod.planning import PlacedPath
 from pentapod.program import read_header, write_csv
 from pentapod.toolpath import SegmentKind
 from pentapod.toolpath.gouge.report import GougeReport
@@ -277,10 +278,46 @@ def test_what_nearer_passes_leave_is_compared_with_the_last_way_that_left_too_mu
     for name, stub in (("job_specification", lambda *_, **__: None), ("mended", lambda _, outcome: outcome)):
         monkeypatch.setattr(other_attempts, name, stub)
     monkeypatch.setattr(other_attempts, "other_way", other)
-    task = SimpleNamespace(machine=None, specification=SimpleNamespace(sources=SimpleNamespace(machine=None)))
+    task = SimpleNamespace(job=job, machine=None, specification=SimpleNamespace(sources=SimpleNamespace(machine=None)))
     attempt = Planned(task=task, mesh=None, runner=SimpleNamespace(progress=silent, stages=[]))
     other_attempts._otherwise(attempt, first, job, "second attempt")
     assert compared == ["first", expected]
+
+
+@pytest.mark.parametrize(("way", "begins"), [(lambda job: nearer(job, 0.5), True), (standing, False)])
+@pytest.mark.parametrize("refused", [False, True])
+def test_nearer_passes_begin_at_the_placement_of_the_run_before(way, begins, refused, job, monkeypatch):
+    """An upright tool does not; and where that start does not help, all is searched for again."""
+    tips = np.zeros((1, 3))
+    placed = PlacedPath([0], None, None, tips, tips, np.ones((1, 1)), ())
+    failed, starts, stages = failing(job, SURFACE_LEFT, left=0.9), [], []
+
+    class Planned(SimpleNamespace):
+        def with_task(self, *, start=None, **_):
+            return Planned(**{**vars(self), "start": start})
+
+        def planned(self):
+            starts.append(self.start)
+            stages.append(len(self.runner.stages))
+            self.runner.stages.append(None)
+            limits = ("leg 1 too long",) if refused and self.start is not None else ()
+            return failing(job, *(() if limits else (SURFACE_LEFT,)), limits=limits)
+
+        def withheld(self):
+            return None
+
+        def put_back(self, failed, _):
+            return failed
+
+    for name, stub in (("job_specification", lambda *_, **__: None), ("mended", lambda _, outcome: outcome)):
+        monkeypatch.setattr(other_attempts, name, stub)
+    monkeypatch.setattr(other_attempts, "other_way", lambda *_: None)
+    task = SimpleNamespace(job=job, machine=None, specification=SimpleNamespace(sources=SimpleNamespace(machine=None)))
+    attempt = Planned(task=task, mesh=None, runner=SimpleNamespace(progress=silent, stages=[]), start=None)
+    before = replace(failed, stages=(Stage("placement", 0.0, placed), *failed.stages))
+    other_attempts._otherwise(attempt, before, way(job), "second attempt")
+    assert starts == ([placed] if begins else []) + ([None] if refused or not begins else [])
+    assert len(set(stages)) == 1, "what was tried first leaves no stages"
 
 
 def test_what_fails_decides_on_the_other_way(job):

@@ -113,7 +113,7 @@ def _otherwise(attempt: Attempt, failed: Outcome, job: Job, words: str, before: 
     except InputError:  # no cut is left, or its surface is too large: the first refusal says more
         return failed
     again = attempt.with_task(job=job, specification=specification, runner=runner)
-    outcome = again.planned()
+    outcome = _planned(again, failed.find(PlacedPath) if job.axis == task.job.axis else None)
     if not outcome.passed:
         outcome = mended(again, outcome)
     last = failed if SURFACE_LEFT in failures(failed.verdict) else before
@@ -131,6 +131,20 @@ def _otherwise(attempt: Attempt, failed: Outcome, job: Job, words: str, before: 
         *(stage for stage in runner.stages if isinstance(stage.value, FailedWay | FailedMend)),
     ]
     return attempt.put_back(failed, program)
+
+
+def _planned(attempt: Attempt, start: PlacedPath | None) -> Outcome:
+    """Return the outcome of an attempt; its placement is searched for from scratch only where `start` does not help.
+
+    start: the plan of nearly the same path.
+    """
+    if start is not None:
+        stages = list(attempt.runner.stages)
+        outcome = attempt.with_task(start=start).planned()
+        if outcome.refusal is None or outcome.refusal.stage != "placement":
+            return outcome
+        attempt.runner.stages = stages
+    return attempt.planned()
 
 
 def _why(failed: Outcome) -> str:
