@@ -47,6 +47,19 @@ def test_margins_know_a_branch_by_the_signs_of_a_file(name):
     assert (values > 0.0).all()
 
 
+@pytest.mark.parametrize("shape", [(300,), (60, 5)])
+def test_the_smallest_margin_is_that_of_all_limits(desk, shape):
+    """Without legs that touch it is that of the others, bit for bit."""
+    margins = Margins.of(desk, PLUS)
+    tips, axes = (each.reshape(*shape, 3) for each in poses(desk, 300, spread=0.3, seed=2))
+    values = margins.own(tips, axes)
+    pairs = np.array(["touch" in limit.name and limit.name.startswith("legs") for limit in margins.own_limits])
+    assert pairs.sum() == 10
+    np.testing.assert_array_equal(margins.least_own(tips, axes), values.min(axis=-1))
+    np.testing.assert_array_equal(margins.least_own(tips, axes, pairs=False), values[..., ~pairs].min(axis=-1))
+    assert (values.argmin(axis=-1) >= pairs.argmax()).any(), "some are nearest to a leg"
+
+
 def test_signs_are_those_of_the_limits_themselves(desk):
     """Each row's sign against the limit evaluated from joint positions, with angles by arc cosine."""
     tips, axes = poses(desk, 2000, spread=0.3, seed=1)

@@ -125,10 +125,24 @@ class Margins:
         """
         if tips.ndim == 2 and len(tips) > block:
             return np.concatenate([self.own(tips[part], axes[part]) for part in blocks(len(tips), block)])
-        tip, axis = list(np.moveaxis(tips, -1, 0)), list(np.moveaxis(axes, -1, 0))
-        pose = ToolPose(self.scene.machine, self.scene.branch, tip, axis, NUMPY)
+        pose = self._pose(tips, axes)
         values = np.broadcast_arrays(*(limit.margin(pose) for limit in self.own_limits))
         return np.moveaxis(np.stack(values), 0, -1)
+
+    def least_own(self, tips: Floats, axes: Floats, *, pairs: bool = True) -> Floats:
+        """Return the smallest margin (...) of the machine alone, in a third of the time of all of them.
+
+        pairs: whether legs may touch each other; without these limits it is an upper bound, in a tenth of the time.
+        """
+        pose, least = self._pose(tips, axes), np.full(tips.shape[:-1], np.inf)
+        for limit in self.own_limits:
+            if pairs or not isinstance(limit, LegPairClearance):
+                np.minimum(least, limit.margin(pose), out=least)
+        return least
+
+    def _pose(self, tips: Floats, axes: Floats) -> ToolPose:
+        tip, axis = (list(np.ascontiguousarray(np.moveaxis(each, -1, 0))) for each in (tips, axes))
+        return ToolPose(self.scene.machine, self.scene.branch, tip, axis, NUMPY)
 
     def contacts(self, tips: Floats, axes: Floats, placement: RigidTransform) -> Floats:
         """Return the contacts (n, contact_numbers) that `symbolic` needs, of poses (n, 3); none without obstacles."""

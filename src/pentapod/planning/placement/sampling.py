@@ -174,9 +174,10 @@ def _best(
 ) -> Ints:
     """Return the best `ranked` of placements r (S, 3, 3), t (S, 3) by their smallest margin at `rows`.
 
-    No margin is above the smallest at the first rows: so most placements are judged there alone.
+    No margin is above the smallest at the first rows, without that of legs from each other: so most placements are
+    judged there alone.
     """
-    score = _score(samples, margins, r, t, rows[: options.first])
+    score = _score(samples, margins, r, t, rows[: options.first], pairs=False)
     order, block = np.argsort(-score, kind="stable"), 4 * options.ranked
     exact = np.full(len(score), -np.inf)
     for start in range(0, len(order), block):
@@ -184,8 +185,7 @@ def _best(
         best = np.sort(exact)[-options.ranked :]
         if len(best) == options.ranked and score[chosen[0]] < best[0]:
             break
-        rest = _score(samples, margins, r[chosen], t[chosen], rows[options.first :])
-        exact[chosen] = np.minimum(score[chosen], rest)
+        exact[chosen] = _score(samples, margins, r[chosen], t[chosen], rows)
     return np.argsort(-exact, kind="stable")[: options.ranked]
 
 
@@ -197,7 +197,7 @@ def _without_obstacles(few: ToolpathSamples, margins: Margins, poses: list[Rigid
     rotations, translations = np.stack([p.rotation for p in poses]), np.stack([p.translation for p in poses])
     axes = np.einsum("gij,knj->gkni", rotations, lean(few.nominal, aside))
     centres = np.einsum("gij,nj->gni", rotations, few.tilt_centres) + translations[:, None]
-    return margins.own(centres[:, None] - few.tilt_centre * axes, axes).min(axis=-1).max(axis=1).min(axis=-1)
+    return margins.least_own(centres[:, None] - few.tilt_centre * axes, axes).max(axis=1).min(axis=-1)
 
 
 def _near(one: RigidTransform, other: RigidTransform, centre: Floats, options: SamplingOptions) -> bool:
@@ -207,10 +207,13 @@ def _near(one: RigidTransform, other: RigidTransform, centre: Floats, options: S
     return apart < options.apart_m and turn > np.cos(options.apart_rad)
 
 
-def _score(samples: ToolpathSamples, margins: Margins, r: Floats, t: Floats, rows: Ints) -> Floats:
+def _score(
+    samples: ToolpathSamples, margins: Margins, r: Floats, t: Floats, rows: Ints, *, pairs: bool = True
+) -> Floats:
+    """Return the smallest margins (S,) at `rows`. pairs: as for `Margins.least_own`."""
     turned = np.einsum("sij,nj->sni", r, samples.nominal[rows])
     tips = np.einsum("sij,nj->sni", r, samples.tilt_centres[rows]) + t[:, None, :] - samples.tilt_centre * turned
-    return margins.own(tips, turned).min(axis=(-1, -2), initial=np.inf)
+    return margins.least_own(tips, turned, pairs=pairs).min(axis=-1, initial=np.inf)
 
 
 def _rotations(mean_axis: Floats, side: float, count: int, slope: float, rng: np.random.Generator) -> Floats:

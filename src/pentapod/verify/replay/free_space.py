@@ -147,9 +147,8 @@ class FreeSpace:
         at_samples = np.append(near, np.inf)
         np.minimum(at_samples[1:], near, out=at_samples[1:])
         bounds = (near, at_samples, more, self._turns if by_axis else np.full(len(self._turns), np.inf))
-        reached, routed, spare, cells = kernels.walk(
-            self._motion, self._path, bounds, self._weights, self._options.cells if most is None else min(most, self._options.cells)
-        )
+        most = self._options.cells if most is None else min(most, self._options.cells)
+        reached, routed, spare, cells = kernels.walk(self._motion, self._path, bounds, self._weights, most)
         count = int(cells[0].max())
         if reached < self._samples:
             return reached, count, None
@@ -164,7 +163,8 @@ class FreeSpace:
         samples[0], samples[-1] = 0.0, self._waypoints - 1.0
         waypoints[0], waypoints[-1] = 0.0, self._samples - 1.0
         times = _ordered(waypoints[:, 2], waypoints[:, 0], waypoints[:, 1])
-        return reached, count, Pairing(intervals, samples[:, 0], samples[:, 1], times, max(float(np.max(radii)) + spare, 0.0))
+        least = max(float(np.max(radii)) + spare, 0.0)
+        return reached, count, Pairing(intervals, samples[:, 0], samples[:, 1], times, least)
 
 
 def _curve(line: PosedPolyline) -> tuple[Floats, Floats]:
