@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pentapod.numerics.kernels import kernels_pay, kernels_used
-from pentapod.numerics.threads import CORES, ROWS, cores, for_rows, in_threads
+from pentapod.numerics.threads import CORES, ROWS, both, cores, for_rows, in_threads
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5, None])
@@ -42,6 +42,15 @@ def test_one_item_takes_no_other_thread_and_more_may_be_begun_ahead():
     results.close()
 
 
+def test_two_functions_work_beside_each_other(monkeypatch):
+    monkeypatch.setenv(CORES, "2")
+    together = threading.Barrier(2, timeout=10.0)
+    first, second = both(lambda: (together.wait(), "one")[1], lambda: (together.wait(), 2)[1])
+    assert (first, second) == ("one", 2)
+    monkeypatch.setenv(CORES, "1")
+    assert both(threading.current_thread, lambda: 3) == (threading.current_thread(), 3)
+
+
 def test_an_error_comes_where_its_result_would():
     results = in_threads(lambda k: 1 // (3 - k), range(10), 2)
     assert [next(results) for _ in range(3)] == [0, 0, 1]
@@ -64,9 +73,14 @@ def test_the_environment_says_how_many_cores_a_process_uses(monkeypatch):
     assert given == cores() >= 1
 
 
-@pytest.mark.parametrize("count", [0, 1, ROWS, 2 * ROWS + 7])
-def test_rows_are_filled_in_the_same_blocks_on_any_number_of_cores(monkeypatch, count):
-    """Each row adds the one before it in its block, so that other blocks would give other sums."""
+@pytest.mark.parametrize(
+    ("count", "size"), [(0, 64), (1, 64), (500, 64), (803, 101), (ROWS, 256), (9 * ROWS + 7, ROWS)]
+)
+def test_rows_are_filled_in_the_same_blocks_on_any_number_of_cores(monkeypatch, count, size):
+    """Each row adds the one before it in its block, so that other blocks would give other sums.
+
+    Of few rows all cores have some.
+    """
     given, found = np.random.default_rng(1).normal(size=(count, 2)), []
 
     def sums(rows, factor, filled, lengths):
@@ -78,6 +92,6 @@ def test_rows_are_filled_in_the_same_blocks_on_any_number_of_cores(monkeypatch, 
         filled, lengths = np.full((count, 2), np.nan), np.zeros(count, dtype=np.intp)
         for_rows(sums, (given,), (3.0,), (filled, lengths))
         found.append(filled)
-        assert (lengths == np.minimum(ROWS, count - ROWS * (np.arange(count) // ROWS))).all()
-    blocks = [3.0 * np.cumsum(given[k : k + ROWS], axis=0) for k in range(0, count, ROWS)]
+        assert (lengths == np.minimum(size, count - size * (np.arange(count) // size))).all()
+    blocks = [3.0 * np.cumsum(given[k : k + size], axis=0) for k in range(0, count, size)]
     assert all(np.array_equal(each, np.concatenate([*blocks, np.empty((0, 2))])) for each in found)

@@ -20,6 +20,7 @@ from pentapod.numerics.blocks import blocks
 Array = npt.NDArray[Any]
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
+_Other = TypeVar("_Other")
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
@@ -64,8 +65,17 @@ def in_threads(
                 future.cancel()
 
 
+def both(first: Callable[[], _Result], second: Callable[[], _Other]) -> tuple[_Result, _Other]:
+    """Return what two functions return, which work beside each other where there are cores."""
+    results: list[Any] = list(in_threads(lambda each: each(), (first, second)))
+    return results[0], results[1]
+
+
 ROWS = 2048
 """Rows that a thread takes at a time: some milliseconds of a kernel that searches a mesh for each."""
+
+BLOCKS, LEAST_ROWS = 8, 64
+"""Into how many blocks fewer rows are divided, so that all cores have some, and how many are worth a thread."""
 
 
 def for_rows(
@@ -76,11 +86,13 @@ def for_rows(
     The blocks do not depend on the number of threads. So what is filled does not either, even where a row begins with
     what the one before it in its block has found.
     """
+    count = len(filled[0])
+    size = min(max(-(-count // BLOCKS), LEAST_ROWS), ROWS)
 
     def done(k: slice) -> None:
         kernel(*(array[k] for array in rows), *given, *(array[k] for array in filled))
 
-    for _ in in_threads(done, list(blocks(len(filled[0]), ROWS))):
+    for _ in in_threads(done, list(blocks(count, size))):
         pass
 
 

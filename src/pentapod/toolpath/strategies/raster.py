@@ -18,6 +18,7 @@ from pentapod.geometry.directions import tangent_frame
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.slicing import LevelSet
+from pentapod.numerics.threads import both
 from pentapod.toolpath.lines.gap_filling import FRONTS, GapOptions, gap_lines, lines_as_sources
 from pentapod.toolpath.lines.scallop import level_values
 from pentapod.toolpath.lines.steep_areas import steep_facets
@@ -88,12 +89,15 @@ def with_waterlines(surface: Surface, options: RasterOptions, paths: Callable[[P
     steep = steep_facets(whole, options.up, options.steep, narrow)
     if not steep.any():
         return paths(whole)
-    lines, stepover = plane_lines(surface, whole.only(steep), options, options.up)
-    first = None if steep.all() else paths(whole.only(~steep))
     share, degrees = float(whole.areas[steep].sum() / whole.areas.sum()), np.degrees(options.steep)
     notes = (f"{100.0 * share:.2g} % of the region is steeper than {degrees:.3g} deg: waterlines there",)
-    if first is None:
-        return ContactPaths(lines, stepover, Order.ZIGZAG, notes=notes)
+
+    def waterlines() -> tuple[Passes, float]:
+        return plane_lines(surface, whole.only(steep), options, options.up)
+
+    if steep.all():
+        return ContactPaths(*waterlines(), Order.ZIGZAG, notes=notes)
+    first, (lines, stepover) = both(lambda: paths(whole.only(~steep)), waterlines)
     # An empty level between both: the waterlines do not continue the last pass.
     lines = replace(lines, levels=lines.levels + int(first.passes.levels.max()) + 2)
     passes = Passes.joined([first.passes, lines])
