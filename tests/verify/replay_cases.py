@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -19,7 +20,6 @@ from pentapod.program import Program, Provenance, quantised
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import Coverage, Cutting, Replay, Specification
 from pentapod.verify.replay.interval_bounds import IntervalBounds
-from pentapod.verify.replay.path_matching import PathMatch
 
 STAND = load_machine(Path(__file__).with_name("stand.toml"))
 BALL = 3e-3
@@ -247,7 +247,7 @@ def given_match(samples, waypoints, **given):
     zeros = {name: np.zeros(waypoints) for name in of_waypoints} | {name: np.zeros(samples) for name in of_samples}
     match = zeros | {name: np.asarray(values) for name, values in given.items()}
     even = {"waypoint_turned": np.interp(match["times"], np.arange(samples), match["turned"])}
-    return PathMatch(**(even | match))
+    return SimpleNamespace(**(even | match))
 
 
 def measured(toolpath, tilt_centres, axes=None, *, bounds=None, match=None, machine=STAND, legs=None, **changes):

@@ -1,6 +1,7 @@
 """Programs that are slower than they have to be, or stand where nothing asks for it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -144,10 +145,11 @@ def lagging(case, program, rows, lag):
     """The replay of a program whose matching holds its rows `lag` metres before the reversal."""
     replay = cases.replay_of(case, program)
     end = arc_length(case.toolpath.tilt_centres)[case.toolpath.starts[REVERSAL + 1]]
-    arcs = replay.match.arcs.copy()
+    match = replay.match
+    arcs = match.arcs[:].copy()
     still = 2 * (rows[-1] + SLOW_ROWS)
     arcs[:still] = np.minimum(arcs[:still], end - lag)
-    replay.__dict__["match"] = replace(replay.match, arcs=arcs)
+    replay.__dict__["match"] = SimpleNamespace(**(vars(match) | {"arcs": arcs, "turned": match.turned}))
     return replay
 
 

@@ -46,25 +46,51 @@ OPTIONS = MatchOptions()
 
 
 @dataclass(frozen=True, eq=False)
+class AtPlaces:
+    """Numbers at places (M,) of the path, from those at its waypoints (n,); computed where they are asked for."""
+
+    places: Floats
+    of_waypoints: Floats
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def __getitem__(self, rows: slice | Ints | int) -> Floats:
+        """Return the numbers at some of the places."""
+        places, values = self.places[rows], self.of_waypoints
+        k = np.minimum(places.astype(np.intp), len(values) - 2)
+        return np.asarray((values[k + 1] - values[k]) * (places - k) + values[k])
+
+
+@dataclass(frozen=True, eq=False)
 class PathMatch:
     """A monotone matching of M samples of the program with the n waypoints of the toolpath.
 
     times (n,): when each waypoint is passed, in samples (2.25 is a quarter of the way from sample 2 to 3),
-    non-decreasing. places (M,): the place of each sample, in waypoints, non-decreasing. arcs (M,): the same as arc
-    length of the tilt centre's polyline, metres. turned (M,), waypoint_turned (n,): how far the path's axis turns up to
-    there, radians. distances (M,), waypoint_distances (n,) in metres and angles (M,), waypoint_angles (n,) in radians:
-    between the matched tilt centres and axes.
+    non-decreasing. places (M,): the place of each sample, in waypoints, non-decreasing. waypoint_arcs (n,): arc length
+    of the tilt centre's polyline up to there, metres; waypoint_turned (n,): how far the path's axis turns up to there,
+    radians; `arcs` and `turned` are those of samples. distances (M,), waypoint_distances (n,) in metres and angles
+    (M,), waypoint_angles (n,) in radians: between the matched tilt centres and axes.
     """
 
     times: Floats
     places: Floats
-    arcs: Floats
-    turned: Floats
+    waypoint_arcs: Floats
     waypoint_turned: Floats
     distances: Floats
     waypoint_distances: Floats
     angles: Floats
     waypoint_angles: Floats
+
+    @property
+    def arcs(self) -> AtPlaces:
+        """Arc length of the path up to each sample, metres."""
+        return AtPlaces(self.places, self.waypoint_arcs)
+
+    @property
+    def turned(self) -> AtPlaces:
+        """How far the path's axis turns up to each sample, radians."""
+        return AtPlaces(self.places, self.waypoint_turned)
 
 
 def match(
@@ -166,13 +192,11 @@ def _measure(
     chord = np.minimum(times.astype(np.intp), len(motion.points) - 2)
     at = (times - chord)[:, None]
     pointed = motion.axes[chord] * (1.0 - at) + motion.axes[chord + 1] * at
-    waypoints, turned = np.arange(len(path.points)), np.concatenate([[0.0], np.cumsum(turns)])
     return PathMatch(
         times=times,
         places=places,
-        arcs=np.interp(places, waypoints, arc_length(path.points)),
-        turned=np.interp(places, waypoints, turned),
-        waypoint_turned=turned,
+        waypoint_arcs=arc_length(path.points),
+        waypoint_turned=np.concatenate([[0.0], np.cumsum(turns)]),
         distances=distances,
         waypoint_distances=row_lengths(points_at(motion.points, times) - path.points),
         angles=angles,
