@@ -1,7 +1,7 @@
 """Value: short `repr`, equality by content, pickles."""
 
 import pickle
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -78,3 +78,19 @@ def test_pickles_come_back_equal_read_only_and_without_caches():
     assert not again.tips.flags.writeable
     assert not again.parts[0].flags.writeable
     assert again.total == value.total
+
+
+def test_frozen_arrays_are_copied_once():
+    """What is read-only and owns its numbers is shared; a view may change with the array it looks at."""
+    given = np.array([1.0, 2.0])
+    once = frozen(given, "x")
+    assert once is not given
+    assert frozen(once, "x") is once
+    view = given[:]
+    view.flags.writeable = False
+    copied = frozen(view, "x")
+    given[0] = 3.0
+    assert (once[0], copied[0]) == (1.0, 1.0)
+    assert replace(Path(TIPS), name="other").tips is not TIPS
+    first = Path(TIPS)
+    assert replace(first, name="other").tips is first.tips

@@ -47,8 +47,14 @@ def as_batch(value: ArrayLike, name: str, shape: tuple[int | None, ...] | None =
 
 
 def frozen(value: ArrayLike, name: str, shape: tuple[int | None, ...] | None = None) -> Floats:
-    """Return a finite, read-only copy of `value`: for frozen dataclasses. Raises ArrayError."""
-    array = as_floats(value, name, shape).copy()
+    """Return a finite, read-only copy of `value`: for frozen dataclasses. Raises ArrayError.
+
+    An array that is read-only and owns its numbers is returned itself: those of another frozen dataclass are shared.
+    """
+    array = as_floats(value, name, shape)
+    if array is value and array.flags.owndata and not array.flags.writeable:
+        return array
+    array = array.copy()
     array.flags.writeable = False
     return array
 

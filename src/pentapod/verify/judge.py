@@ -10,6 +10,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Unpack
 
+import numpy as np
+
 from pentapod.base.errors import InputError, MachineError, ProgramError, nearest
 from pentapod.base.files import atomic_write, sha256_of
 from pentapod.base.progress import Progress, silent
@@ -104,8 +106,12 @@ def judged(
     strict: bool = False,
     claims: Sequence[Claim] = (),
     progress: Progress = silent,
+    in_memory: Program | None = None,
 ) -> Verdict:
-    """Return the verdict on a program, or on a program file, against a specification, as `verify`."""
+    """Return the verdict on a program, or on a program file, against a specification, as `verify`.
+
+    in_memory: a program; where a file holds the same legs, these are held once.
+    """
     known = (*CLAIM_NAMES, *(claim.name for claim in claims))
     for name in specification.waived:
         if name not in known:
@@ -118,7 +124,7 @@ def judged(
         progress("verify", 0.0, "reading")
         sources = replace(sources, program=sha256_of(path))
         try:
-            program = read_csv(path)
+            program = _held_once(read_csv(path), in_memory)
         except InputError as error:
             return Verdict((_certificate(READABLE, False, str(error)),), sources=sources)
         method = f"{len(program.legs)} rows, {program.duration:.6g} s, {program.interpolation} interpolation"
@@ -154,6 +160,13 @@ def judged(
     left = None if len(replay.unposed) or len(replay.interval_bounds.unproven) else material_left(replay)
     progress("verify", 1.0)
     return Verdict(tuple(read), tuple(unjudged), sources, springs_digest(program, specification.machine), left)
+
+
+def _held_once(program: Program, other: Program | None) -> Program:
+    """Return a program with the legs of one in memory, where they are the same."""
+    if other is None or not np.array_equal(program.legs, other.legs):
+        return program
+    return replace(program, legs=other.legs)
 
 
 def _answers(replay: Replay, claims: Sequence[Claim]) -> Iterator[Certificate | Idle]:

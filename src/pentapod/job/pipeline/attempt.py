@@ -99,13 +99,15 @@ class Attempt:
         file, runner = self.staging / PROGRAM, self.runner
         (self.staging / WITHHELD).unlink(missing_ok=True)
         program = self.task.program(file)
-        refused = program if isinstance(program, Refusal) else self._with_ways(program)
-        if refused is not None:
+        made = program if isinstance(program, Refusal) else self._with_ways(program)
+        if isinstance(made, Refusal):
             file.unlink(missing_ok=True)
-            return self.refused(refused)
+            return self.refused(made)
         specification, claims = with_ways(self.task.specification, self.staging)
         claims = (*claims, *self.task.claims)
-        verdict = runner.run("verify", lambda: judged(file, specification, claims=claims, progress=runner.progress))
+        verdict = runner.run(
+            "verify", lambda: judged(file, specification, claims=claims, progress=runner.progress, in_memory=made)
+        )
         if (fails := withheld(verdict)) is not None:
             runner.stages.append(Stage("withheld", 0.0, fails))
             file.rename(self.staging / WITHHELD)
@@ -161,16 +163,19 @@ class Attempt:
             file.write_bytes(program)
         return self.ended(failed.verdict)
 
-    def _with_ways(self, program: Program) -> Refusal | None:
-        """Make the ways of a program and write them beside it, if the machine has a park pose; or return a refusal."""
+    def _with_ways(self, program: Program) -> Program | Refusal:
+        """Make the ways of a program and write them beside it, if the machine has a park pose.
+
+        Return the program, or a refusal.
+        """
         remove_ways(self.staging)
         task = self.task
         if task.machine.park.pose is None:
-            return None
+            return program
         machine = program.machine(task.machine)
         specification, kinds = dataclasses.replace(task.specification, machine=machine), pose_limits(task.job)
         made = self.runner.run("ways", lambda: ways(program, specification, limits=task.limits, kinds=kinds))
         if isinstance(made, Refusal):
             return made
         write_ways(made, self.staging)
-        return None
+        return program
