@@ -132,7 +132,10 @@ BAD = {
     "letter.obj": (lambda _: OBJ_POINTS.replace(b"v 1", b"v l") + b"f 1 2 3\n", "letter.obj:2: v: .*not three numbers"),
     "line.obj": (lambda _: OBJ_POINTS + b"f 1 2\n", "line.obj:4: f: .*not three corners"),
     "curve.obj": (lambda _: OBJ_POINTS + b"curv 0 1 1 2 3\n", "curve.obj:4: curv: .*an unknown word"),
-    "cut.obj": (lambda _: OBJ_POINTS + b"f 1 2 3\nf 1 3 2", "cut.obj:5: the last line has no end"),
+    "cut.obj": (lambda _: OBJ_POINTS + b"f 1 2 3\nf 1//1 3//3 2", "cut.obj:5: the last line has no end"),
+    "slash.obj": (lambda _: OBJ_POINTS + b"f 1/1 2/2 3/", "slash.obj:4: the last line has no end"),
+    "number.obj": (lambda _: OBJ_POINTS + b"f 1 2 3\nv 0 0 1", "number.obj:5: the last line has no end|cut off"),
+    "few.obj": (lambda _: OBJ_POINTS + 200 * b"v 0 0 0\nf -1 1 2\n" + b"v 0 1 1\nf 1 2 3", "few.obj:405: the last line has no end"),
     "points.obj": (lambda _: OBJ_POINTS, "no facets"),
     "letter.ply": (
         lambda _: PLY_HEAD % 3 + PLY_FACES % 1 + PLY_POINTS.replace(b"1 0", b"l 0") + b"3 0 1 2\n",

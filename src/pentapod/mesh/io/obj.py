@@ -57,11 +57,13 @@ def _read(path: Path, data: bytes, options: ReadOptions) -> MeshData:
             f"cannot be read as OBJ: {what.get(word, 'an unknown word')}",
             file=path, line=line_of(data, strange.start()), key=word, value=value, remedy=EXPORT_AGAIN,
         )  # fmt: skip
-    check_last_line(path, data)
     vertices, places = _vertices(text)
     faces = _facets(path, data, text, places)
     _check_announced(path, text, len(vertices), len(faces))
-    return MeshData(vertices, faces, _unused(path, text, vertices, faces, loose=options.loose))
+    notes = _unused(path, text, vertices, faces, loose=options.loose)
+    if notes or not _ends_whole(text):
+        check_last_line(path, data)
+    return MeshData(vertices, faces, notes)
 
 
 def _joined_lines(data: bytes) -> bytes:
@@ -144,6 +146,18 @@ def _unused(path: Path, text: bytes, vertices: Floats, faces: Ints, *, loose: bo
         remedy = "export the mesh again; where it is complete, repair = true takes it as it is"
         raise MeshError(what, file=path, remedy=remedy)
     return (what,) if unused else ()
+
+
+def _ends_whole(text: bytes) -> bool:
+    """Return whether the last line can be whole without an end, as many programs leave it: no vertex, or a part of one.
+
+    A facet has corners of the same form.
+    """
+    last = text[max(text.rfind(b"\n"), text.rfind(b"\r")) + 1 :]
+    facet = _FACET.match(last)
+    if facet is None:
+        return _VERTEX.match(last) is None
+    return len({(corner.count(b"/"), corner.endswith(b"/")) for corner in facet[1].split()}) == 1
 
 
 def _check(path: Path, head: bytes, _size: int) -> None:
