@@ -30,9 +30,9 @@ def test_where_it_was_planned_the_margins_are_the_plans(planned, opened, study):
     placed = planned[1].find(PlacedPath)
     reach = study.at(opened.placement, thorough=True)
     assert np.array_equal(reach.rows, np.arange(len(placed.tips)))
-    assert reach.margins == pytest.approx(placed.margins.min(axis=1), abs=1e-9)
+    assert reach.margins.astype(np.float32) == pytest.approx(placed.margins.min(axis=1), abs=1e-9)
     assert reach.worst.limit == placed.active_limit
-    assert reach.worst.margin == pytest.approx(placed.smallest_margin, abs=1e-9)
+    assert np.float32(reach.worst.margin) == pytest.approx(placed.smallest_margin, abs=1e-9)
     assert reach.fits
     assert reach.beyond == 0.0
 

@@ -46,15 +46,18 @@ def as_batch(value: ArrayLike, name: str, shape: tuple[int | None, ...] | None =
     return array
 
 
-def frozen(value: ArrayLike, name: str, shape: tuple[int | None, ...] | None = None) -> Floats:
+def frozen(
+    value: ArrayLike, name: str, shape: tuple[int | None, ...] | None = None, kind: type[np.floating] = np.float64
+) -> NDArray[Any]:
     """Return a finite, read-only copy of `value`: for frozen dataclasses. Raises ArrayError.
 
     An array that is read-only and owns its numbers is returned itself: those of another frozen dataclass are shared.
+    kind: of its numbers.
     """
-    array = as_floats(value, name, shape)
-    if array is value and array.flags.owndata and not array.flags.writeable:
-        return array
-    array = array.copy()
+    if isinstance(value, np.ndarray) and value.dtype == kind and value.flags.owndata and not value.flags.writeable:
+        as_floats(value, name, shape)
+        return value
+    array = as_floats(value, name, shape).astype(kind)
     array.flags.writeable = False
     return array
 

@@ -125,7 +125,7 @@ def plan(
     rows = samples.shaping(toolpath.starts)
     placed = planned(rows)
     # One that does not shape the path may all the same be out of limits.
-    if len(rows) < len(toolpath) and isinstance(placed, PlacedPath) and placed.smallest_margin < NEEDED_MARGIN:
+    if len(rows) < len(toolpath) and isinstance(placed, PlacedPath) and not placed.keeps(NEEDED_MARGIN):
         placed = planned(np.arange(len(toolpath)))
     return placed
 
@@ -199,7 +199,7 @@ def _as_planned(
     """Return the path placed as a plan of nearly the same path that keeps all limits; None where it does not."""
     here = problem.constraints.nearest_to(start.placement.transform)
     margins = next((each for each in problem.margins if each.scene.branch == start.component), None)
-    if start.smallest_margin < NEEDED_MARGIN or margins is None:
+    if not start.keeps(NEEDED_MARGIN) or margins is None:
         return None
     at = problem.candidate(margins, here, problem.upright)
     leans = leans_as_planned(problem, at, toolpath, start, progress)
@@ -220,9 +220,9 @@ def _refusal(toolpath: Toolpath, problem: PlacementProblem, own: OwnLeans) -> Un
     """Return why a path does not fit at the best placement found; what fits as it leans there needs no other tilts."""
     best = own.at
     # Where each fits by itself, no smooth leans were found.
-    attempt = _path(toolpath, problem, best, own.field if own.fit else own.mixed, "best attempt")
-    values = attempt.margins
+    leans = own.field if own.fit else own.mixed
+    attempt = _path(toolpath, problem, best, leans, "best attempt")
+    values = best.margins(attempt.tips, attempt.axes, best.transform)  # not rounded as those of the path
     if not own.fit:
-        values = values.copy()
         values[own.rows] = own.margins
     return refusal(values, attempt, best.margins, NEEDED_MARGIN, fixed=not problem.constraints.moves)

@@ -140,7 +140,7 @@ def test_a_plan_says_where_the_guides_stand(sliding, here, desk):
     np.testing.assert_array_equal(np.round(rail_positions, 6), rail_positions)
     machine = sliding.at(rail_positions)
     again = Margins.of(machine, COMPONENT)(placed[0].tips, placed[0].axes)
-    np.testing.assert_array_equal(again, placed[0].margins)
+    np.testing.assert_array_equal(again.astype(np.float32), placed[0].margins)
     fixed = plan(path, desk, **options)
     assert fixed.placement.rail_positions is None
     assert placed[0].smallest_margin > fixed.smallest_margin

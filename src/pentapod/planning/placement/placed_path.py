@@ -41,11 +41,16 @@ class Placement(Value):
         return "" if self.rail_positions is None else ", ".join(f"{1e3 * x:.3f}" for x in self.rail_positions) + " mm"
 
 
+SINGLE = 1e-7
+"""Rounding of margins up to 1 to single precision."""
+
+
 @dataclass(frozen=True, eq=False)
 class PlacedPath(Result):
     """Tool poses in the machine frame, one for each waypoint of the toolpath.
 
-    tips (N, 3) metres; axes (N, 3) unit, tip → spindle; margins (N, M) of the limits (M,), dimensionless, 0 at a limit.
+    tips (N, 3) metres; axes (N, 3) unit, tip → spindle; margins (N, M) of the limits (M,), dimensionless, 0 at a limit,
+    in single precision: of a long path they take more memory than all else.
     common_axis: the direction towards which the tool leans from the toolpath's axes; None where none was chosen.
 
     >>> str(placed.component), placed.margins.shape == (len(placed.tips), len(placed.limits))
@@ -64,8 +69,10 @@ class PlacedPath(Result):
     common_axis: CommonAxis | None = None
 
     def __post_init__(self) -> None:
-        for name in ("tips", "axes", "margins"):
-            set_frozen(self, **{name: frozen(getattr(self, name), name, (len(self.toolpath), None))})
+        count = len(self.toolpath)
+        for name in ("tips", "axes"):
+            set_frozen(self, **{name: frozen(getattr(self, name), name, (count, None))})
+        set_frozen(self, margins=frozen(self.margins, "margins", (count, None), np.float32))
 
     @property
     def margin_names(self) -> tuple[str, ...]:
@@ -76,6 +83,10 @@ class PlacedPath(Result):
     def smallest_margin(self) -> float:
         """The smallest margin over all waypoints and limits."""
         return float(self.margins.min())
+
+    def keeps(self, margin: float) -> bool:
+        """Return whether no margin is smaller, but for its rounding to single precision."""
+        return self.smallest_margin >= margin - SINGLE
 
     @property
     def active_limit(self) -> str:
