@@ -135,7 +135,10 @@ BAD = {
     "cut.obj": (lambda _: OBJ_POINTS + b"f 1 2 3\nf 1//1 3//3 2", "cut.obj:5: the last line has no end"),
     "slash.obj": (lambda _: OBJ_POINTS + b"f 1/1 2/2 3/", "slash.obj:4: the last line has no end"),
     "number.obj": (lambda _: OBJ_POINTS + b"f 1 2 3\nv 0 0 1", "number.obj:5: the last line has no end|cut off"),
-    "few.obj": (lambda _: OBJ_POINTS + 200 * b"v 0 0 0\nf -1 1 2\n" + b"v 0 1 1\nf 1 2 3", "few.obj:405: the last line has no end"),
+    "few.obj": (
+        lambda _: OBJ_POINTS + 200 * b"v 0 0 0\nf -1 1 2\n" + b"v 0 1 1\nf 1 2 3",
+        "few.obj:405: the last line has no end",
+    ),
     "points.obj": (lambda _: OBJ_POINTS, "no facets"),
     "letter.ply": (
         lambda _: PLY_HEAD % 3 + PLY_FACES % 1 + PLY_POINTS.replace(b"1 0", b"l 0") + b"3 0 1 2\n",
