@@ -200,6 +200,16 @@ def test_where_the_middle_of_a_large_part_holds_nothing_the_box_is_elsewhere(tmp
     assert any("a box where it holds most is machined" in remark for remark in proposal.remarks)
 
 
+def test_the_box_on_a_large_plate_of_few_facets_is_at_its_top(tmp_path):
+    """Only the boss below it has vertices in the middle; "no side of this surface can be machined" was said."""
+    plate = trimesh.creation.box((400, 400, 10))
+    boss = trimesh.creation.cylinder(10.0, 20.0).apply_translation((0, 0, -15))
+    job, _ = proposed(tmp_path, trimesh.util.concatenate([plate, boss]))
+    patch = Patch.of(job_mesh(job), job_region(job))
+    assert patch.vertices[:, 2].max() == pytest.approx(5e-3)
+    assert patch.areas.sum() > 0.5 * (0.8 * DESK.work.diameter) ** 2
+
+
 def test_facets_that_do_not_join_are_an_error(tmp_path):
     corners = np.random.default_rng(1).uniform(0.0, 40.0, (20, 3, 3))
     loose = trimesh.Trimesh(**trimesh.triangles.to_kwargs(corners), process=False)

@@ -20,7 +20,7 @@ class ProposalOptions:
     in waterlines beside a raster, whose passes leave those that are parallel to them. debris: largest share of an open
     surface that small bodies are left out with; these are as small as a cutter may be. boxes: rows and columns of
     places for a box where the part is too large; middle: what its middle must hold to be taken, as a share of what the
-    best of them holds. above_foot: share of what
+    best of them holds; points: that stand for the surface then. above_foot: share of what
     the view sees of the region below which a box above the foot is no use, and flatter_deg: angles of the region of
     which the largest is taken then.
     """
@@ -44,6 +44,7 @@ class ProposalOptions:
     debris: float = 0.02
     boxes: int = 9
     middle: float = 0.3
+    points: int = 20_000
     above_foot: float = 0.5
     flatter_deg: tuple[float, ...] = (80.0, 70.0, 60.0, 50.0, 40.0, 30.0, 20.0, 10.0)
 

@@ -189,17 +189,19 @@ def _box(mesh: Mesh, direction: Floats, work: WorkVolume) -> tuple[Floats | None
     if share == 1.0 and height == high[2] - low[2]:
         return None, ""
     half, where = 0.5 * share * (high - low)[:2], "in its middle"
-    facing = mesh.facet_areas * np.maximum(mesh.facet_normals @ direction, 0.0)
-    places = points[mesh.faces].mean(axis=1)[:, :2]
+    # Facets may be larger than the box: points stand for what faces the direction.
+    spread, normals = Patch.whole(mesh).spread(OPTIONS.points)
+    facing, places = np.maximum(normals @ direction, 0.0), spread @ frame.T
     first, last = (low + 0.5 * share * (high - low))[:2], (high - 0.5 * share * (high - low))[:2]
     rows, columns = (np.unique(each) for each in np.linspace(first, last, OPTIONS.boxes).T)
     middles = [0.5 * (low + high)[:2], *(np.array([x, y]) for x in rows for y in columns)]
-    held = [float(facing[(np.abs(places - middle) <= half).all(axis=1)].sum()) for middle in middles]
+    held = [float(facing[(np.abs(places[:, :2] - middle) <= half).all(axis=1)].sum()) for middle in middles]
     middle = middles[0]
     if held[0] < OPTIONS.middle * max(held):
         middle, where = middles[int(np.argmax(held))], "where it holds most"
     # What lies above the middle; the highest of it is machined.
-    near = points[(np.abs(points[:, :2] - middle) <= half).all(axis=1)]
+    both = np.concatenate([points, places])
+    near = both[(np.abs(both[:, :2] - middle) <= half).all(axis=1)]
     top = near[:, 2].max() if len(near) else high[2]
     margin = OPTIONS.margin * work.height
     corners = np.array([[*(middle - half), top - height - margin], [*(middle + half), top + margin]]) @ frame
