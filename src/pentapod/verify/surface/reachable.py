@@ -18,7 +18,7 @@ from pentapod.geometry.solids import Solid
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.mesh.query.heightfield import HeightField
-from pentapod.mesh.query.swept_depth import TouchingBody, sweep, touch
+from pentapod.mesh.query.swept_depth import TouchingBody, meets
 
 
 @dataclass(frozen=True)
@@ -198,13 +198,12 @@ def body_reaches(
                 tips += corner[open_]  # so that the rounding touches where the tool leans
             high = np.einsum("ij,ij->i", tips, axes[open_]) >= lowest - options.slack_m
             open_, tips = open_[high], tips[high]
-            both = np.stack([tips, tips + length * axes[open_]], axis=1)
-            free = ~touch(surface.tree, body, tips, axes[open_], threshold=options.depth_m).beyond(options.depth_m)
-            open_, both = open_[free], both[free].reshape(-1, 3)
-            if len(open_):
-                axis = np.repeat(axes[open_], 2, axis=0)
-                out = sweep(surface.tree, body, both, axis, threshold=options.depth_m, every=2)
-                reached[open_[~out.beyond(options.depth_m)]] = True
+            for way in (0.0, length):  # where it stands, and on its way out
+                both = np.stack([tips, tips + way * axes[open_]], axis=1).reshape(-1, 3)
+                turned = np.repeat(axes[open_], 2, axis=0)
+                free = ~meets(surface.tree, body, both, turned, threshold=options.depth_m, every=2)
+                open_, tips = open_[free], tips[free]
+            reached[open_] = True
     return reached
 
 
