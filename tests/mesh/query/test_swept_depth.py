@@ -102,7 +102,7 @@ def test_depth_on_a_sphere_is_the_sag_between_points(ball):
     # An icosphere of 82,000 facets lies up to 6 µm inside the sphere.
     np.testing.assert_allclose(found.depths[:, 0], sag, atol=8e-6)
     np.testing.assert_allclose(found.times[:, 0], 0.5, atol=0.12)
-    assert not touch(tree, tool, tips, axes, threshold=1e-5).beyond(1e-5).any()
+    assert not (touch(tree, tool, tips, axes, threshold=1e-5).deepest > 1e-5).any()
 
 
 def test_depth_of_a_ball_larger_than_a_torus_groove():

@@ -76,10 +76,6 @@ class Sweep:
         """Largest depth (M,) of any part of the tool on each motion."""
         return self.depths.max(axis=1)
 
-    def beyond(self, threshold: float) -> Bools:
-        """Return whether (M,) any part of the tool is deeper than `threshold`, metres."""
-        return self.deepest > threshold
-
 
 def sweep(
     tree: FacetTree,
