@@ -132,7 +132,8 @@ BAD = {
     "letter.obj": (lambda _: OBJ_POINTS.replace(b"v 1", b"v l") + b"f 1 2 3\n", "letter.obj:2: v: .*not three numbers"),
     "line.obj": (lambda _: OBJ_POINTS + b"f 1 2\n", "line.obj:4: f: .*not three corners"),
     "curve.obj": (lambda _: OBJ_POINTS + b"curv 0 1 1 2 3\n", "curve.obj:4: curv: .*an unknown word"),
-    "cut.obj": (lambda _: OBJ_POINTS + b"f 1 2 3\nf 1//1 3//3 2", "cut.obj:5: the last line has no end"),
+    "cut.obj": (lambda _: OBJ_POINTS + b"f 1 2 3\nf 1//1 2//2 3//", "cut.obj:5: the last line has no end"),
+    "open.obj": (lambda _: OBJ_POINTS + b"f 1 2 3", "open.obj:4: the last line has no end.*repair = true takes it"),
     "slash.obj": (lambda _: OBJ_POINTS + b"f 1/1 2/2 3/", "slash.obj:4: the last line has no end"),
     "number.obj": (lambda _: OBJ_POINTS + b"f 1 2 3\nv 0 0 1", "number.obj:5: the last line has no end|cut off"),
     "few.obj": (
@@ -221,6 +222,34 @@ def test_obj_with_the_words_of_other_programs(tmp_path):
     assert mesh.diagnosis.facets == 3
     assert mesh.diagnosis.area == pytest.approx(1e-4 + 0.5 * 10e-3 * np.hypot(5e-3, 9e-3))
     assert "1 of 6 vertices belong to no facet" in str(mesh.diagnosis)
+
+
+CORNERS = ((1, 3, 2), (1, 2, 4), (2, 3, 4), (3, 1, 4))
+"""A tetrahedron's."""
+
+
+@pytest.mark.parametrize("end", ["", "\n# the end"])
+@pytest.mark.parametrize("form", ["f {} {} {}", "f {0}/{0} {1}/{1} {2}/{2}"])
+def test_an_obj_whose_last_line_has_no_end(tmp_path, form, end):
+    """A closed surface lacks no facet, also where each facet has vertices of its own; an open one may."""
+    path, points = tmp_path / "a.obj", ("0 0 0", "9 0 0", "0 9 0", "0 0 9")
+
+    def written(corners, vertices=points):
+        lines = [f"v {point}" for point in vertices] + [form.format(*each) for each in corners]
+        path.write_text("\n".join(lines) + end)
+
+    written(CORNERS)
+    assert load_mesh(path, "mm").diagnosis.watertight
+    written(np.arange(1, 13).reshape(4, 3), [points[k - 1] for each in CORNERS for k in each])
+    assert MESH_FORMATS["obj"].read(path, path.read_bytes(), ReadOptions()).notes == ()
+    written(CORNERS[:-1])
+    with pytest.raises(MeshError, match=r"the last line has no end.*where it is complete, repair = true takes it"):
+        load_mesh(path, "mm")
+    assert "the last line has no end: was the file cut off?" in str(load_mesh(path, "mm", repair=True).diagnosis)
+    written(CORNERS[:1])
+    for repair in (False, True):
+        with pytest.raises(MeshError, match="cut off"):
+            load_mesh(path, "mm", repair=repair)
 
 
 def test_obj_comments_end_at_a_backslash(tmp_path):

@@ -22,6 +22,9 @@ from pentapod.mesh.io.text import EXPORT_AGAIN, NUMBER, check_last_line, line_of
 MOST_UNUSED = 0.01
 """Share of the vertices that may belong to no facet: a file that was cut off between lines has more."""
 
+UNENDED = "the last line has no end: was the file cut off? every vertex belongs to a facet, so it counts as whole"
+"""Note on an open surface that another program may have left so, or that was cut off near its end."""
+
 _CORNER = rb"[-+]?\d++(?:/[-+]?\d*+){0,2}"
 _GAP = rb"[ \t]++"
 _IGNORED = (
@@ -46,7 +49,8 @@ _COMMENT_OR_CONTINUATION = re.compile(rb"(#[^\n]*)|\\\r?\n")
 def _read(path: Path, data: bytes, options: ReadOptions) -> MeshData:
     """Return the content of a file. Raises MeshError with the line.
 
-    With `options.loose` more than `MOST_UNUSED` of the vertices may belong to no facet.
+    With `options.loose` more than `MOST_UNUSED` of the vertices may belong to no facet, and the last line of an open
+    surface may have no end.
     """
     text = _joined_lines(data)
     if strange := _UNKNOWN_LINE.search(text):
@@ -61,8 +65,12 @@ def _read(path: Path, data: bytes, options: ReadOptions) -> MeshData:
     faces = _facets(path, data, text, places)
     _check_announced(path, text, len(vertices), len(faces))
     notes = _unused(path, text, vertices, faces, loose=options.loose)
-    if notes or not _ends_whole(text):
-        check_last_line(path, data)
+    if data[-1:] not in (b"\n", b"\r") and not _is_closed(vertices, faces):
+        if notes or not _ends_whole(text):
+            check_last_line(path, data)
+        if not options.loose:
+            check_last_line(path, data, "; where it is complete, repair = true takes it as it is")
+        notes = (UNENDED,)
     return MeshData(vertices, faces, notes)
 
 
@@ -146,6 +154,15 @@ def _unused(path: Path, text: bytes, vertices: Floats, faces: Ints, *, loose: bo
         remedy = "export the mesh again; where it is complete, repair = true takes it as it is"
         raise MeshError(what, file=path, remedy=remedy)
     return (what,) if unused else ()
+
+
+def _is_closed(vertices: Floats, faces: Ints) -> bool:
+    """Return whether each side of a facet has a facet on the other side: then none is missing."""
+    place = np.unique(vertices, axis=0, return_inverse=True)[1].ravel()[faces]
+    first, second = place.ravel(), np.roll(place, -1, axis=1).ravel()
+    proper, count = first != second, len(vertices)
+    there, back = first * count + second, second * count + first
+    return bool(np.array_equal(np.sort(there[proper]), np.sort(back[proper])))
 
 
 def _ends_whole(text: bytes) -> bool:

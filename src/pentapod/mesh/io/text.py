@@ -24,12 +24,12 @@ def line_of(data: bytes, position: int) -> int:
     return data.count(b"\n", 0, position) + 1
 
 
-def check_last_line(path: Path, data: bytes) -> None:
-    """Raise MeshError where the last line has no line feed: the file is truncated."""
+def check_last_line(path: Path, data: bytes, otherwise: str = "") -> None:
+    """Raise MeshError where the last line has no line feed: the file is truncated. otherwise: further remedy."""
     if data[-1:] not in (b"\n", b"\r"):
         raise MeshError(
             "the last line has no end: the file was cut off",
-            file=path, line=line_of(data, len(data)), remedy="export the mesh again, or end the last line",
+            file=path, line=line_of(data, len(data)), remedy=f"export the mesh again, or end the last line{otherwise}",
         )  # fmt: skip
 
 
