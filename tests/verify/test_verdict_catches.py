@@ -14,6 +14,7 @@ from pentapod.kinematics import Component
 from pentapod.program import Switch, quantised, write_csv
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 from pentapod.verify import CLAIMS, Replay, Specification, verify, write_verdict
+from pentapod.verify import judge as judge_module
 
 GEOMETRY = {"tip deviation", "toolpath covered"}
 CUTTING = cases.cutting_of(*cases.hill())
@@ -543,6 +544,19 @@ def test_file_passes_like_the_program(good, tmp_path):
     assert verdict.passed
     assert verdict.certificates[0].claim == "readable"
     assert verdict.certificates[1:] == judge(good).certificates
+
+
+def test_legs_that_are_in_memory_are_held_once_where_a_file_has_the_same(good, tmp_path, monkeypatch):
+    path, held = write_csv(good.program, tmp_path / "program.csv"), []
+    monkeypatch.setattr(judge_module, "Replay", lambda program, *_: held.append(program) or 1 // 0)
+    legs = good.program.legs.copy()
+    legs[7, 0] += 1e-8
+    others = (good.program, replace(good.program, legs=legs), None)
+    for other in others:
+        with pytest.raises(ZeroDivisionError):
+            judge_module.judged(path, Specification(good.machine, good.toolpath, **cases.ASKED), in_memory=other)
+    assert [program.legs is good.program.legs for program in held] == [True, False, False]
+    assert all(np.array_equal(program.legs, good.program.legs) for program in held)
 
 
 def spoil_nan(lines):

@@ -208,21 +208,30 @@ def _as_planned(
 
 def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: Floats, chosen_by: str) -> PlacedPath:
     """Return the path at a candidate's placement with leans (N, 3), workpiece frame."""
+    return _with_margins(toolpath, problem, at, chosen_by, _posed(problem, at, leans))
+
+
+def _posed(problem: PlacementProblem, at: Candidate, leans: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return tips, axes (N, 3) and margins (N, M) at a candidate's placement."""
     tips, axes = problem.samples.machine_poses(at.transform, lean(problem.samples.nominal, leans))
+    return tips, axes, at.margins(tips, axes, at.transform)
+
+
+def _with_margins(
+    toolpath: Toolpath, problem: PlacementProblem, at: Candidate, chosen_by: str, posed: tuple[Floats, Floats, Floats]
+) -> PlacedPath:
     rail_positions = None if problem.machine.guides is None else tuple(problem.machine.rail_positions.tolist())
-    values = at.margins(tips, axes, at.transform)
     placement = Placement(at.transform, chosen_by, rail_positions)
     branch, common_axis = at.margins.scene.branch, problem.samples.common_axis
-    return PlacedPath(toolpath, placement, branch, tips, axes, values, at.margins.limits, common_axis)
+    return PlacedPath(toolpath, placement, branch, *posed, at.margins.limits, common_axis)
 
 
 def _refusal(toolpath: Toolpath, problem: PlacementProblem, own: OwnLeans) -> UnplacedPath:
     """Return why a path does not fit at the best placement found; what fits as it leans there needs no other tilts."""
     best = own.at
     # Where each fits by itself, no smooth leans were found.
-    leans = own.field if own.fit else own.mixed
-    attempt = _path(toolpath, problem, best, leans, "best attempt")
-    values = best.margins(attempt.tips, attempt.axes, best.transform)  # not rounded as those of the path
+    posed = _posed(problem, best, own.field if own.fit else own.mixed)
+    attempt, values = _with_margins(toolpath, problem, best, "best attempt", posed), posed[-1]
     if not own.fit:
         values[own.rows] = own.margins
     return refusal(values, attempt, best.margins, NEEDED_MARGIN, fixed=not problem.constraints.moves)
