@@ -121,6 +121,15 @@ def test_wrong_component_is_refused(desk, cap, placed):
     assert any("S = 0" in shortfall.constraint for shortfall in answer.diagnosis)
 
 
+def test_a_margin_that_is_just_kept_is_kept_in_single_precision(placed):
+    """0.02 is rounded down to 0.0199999996."""
+    there = replace(placed, margins=np.full(placed.margins.shape, NEEDED_MARGIN))
+    assert there.margins.dtype == np.float32
+    assert NEEDED_MARGIN - 1e-8 < there.smallest_margin < NEEDED_MARGIN
+    assert there.keeps(NEEDED_MARGIN)
+    assert not there.keeps(NEEDED_MARGIN + 1e-6)
+
+
 def test_placement_out_of_reach_is_refused_with_the_true_shortfall(desk, cap, placed):
     """Pushed away along the base normal until legs are too short: the millimetres named are those missing."""
     t = placed.placement.transform

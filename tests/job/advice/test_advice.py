@@ -26,6 +26,7 @@ from pentapod.job.build.tool import job_tool
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.job.pipeline.advice_on_errors import can_help
+from pentapod.job.pipeline.attempt import Attempt
 from pentapod.job.pipeline.run import tried
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
 from pentapod.verify.verdict.verdict import Certificate, Place
@@ -386,6 +387,11 @@ def test_a_trial_whose_search_for_a_placement_is_interrupted_ends(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         tried(Job.load(REFUSED["too far"].write(tmp_path)).with_(placement=dict.fromkeys(FIXED)), progress)
     assert any(note.startswith("interrupted") for note in notes)
+
+
+def test_a_trial_writes_none_of_the_files_of_a_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(Attempt, "write", lambda *_: pytest.fail("the files of a trial are for nobody"))
+    assert tried(Job.load(REFUSED["too far"].write(tmp_path))).stage == "placement"
 
 
 def test_nothing_that_works_is_told(tmp_path):

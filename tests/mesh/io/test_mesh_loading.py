@@ -228,15 +228,14 @@ CORNERS = ((1, 3, 2), (1, 2, 4), (2, 3, 4), (3, 1, 4))
 """A tetrahedron's."""
 
 
-@pytest.mark.parametrize("end", ["", "\n# the end"])
 @pytest.mark.parametrize("form", ["f {} {} {}", "f {0}/{0} {1}/{1} {2}/{2}"])
-def test_an_obj_whose_last_line_has_no_end(tmp_path, form, end):
+def test_an_obj_whose_last_line_has_no_end(tmp_path, form):
     """A closed surface lacks no facet, also where each facet has vertices of its own; an open one may."""
     path, points = tmp_path / "a.obj", ("0 0 0", "9 0 0", "0 9 0", "0 0 9")
 
     def written(corners, vertices=points):
         lines = [f"v {point}" for point in vertices] + [form.format(*each) for each in corners]
-        path.write_text("\n".join(lines) + end)
+        path.write_text("\n".join(lines))
 
     written(CORNERS)
     assert load_mesh(path, "mm").diagnosis.watertight
@@ -249,6 +248,20 @@ def test_an_obj_whose_last_line_has_no_end(tmp_path, form, end):
     written(CORNERS[:1])
     for repair in (False, True):
         with pytest.raises(MeshError, match="cut off"):
+            load_mesh(path, "mm", repair=repair)
+
+
+@pytest.mark.parametrize("end", ["o seco", "# the second body", "usemtl", "v 5 5 5", "v 5 5 5\nf 1 2 163"])
+def test_an_obj_that_is_cut_off_behind_a_closed_body_is_refused(tmp_path, end):
+    """What is there is closed, but a body was to follow. A whole facet of that is taken with repair = true alone."""
+    path, shape = tmp_path / "a.obj", surfaces.sphere(50.0, 2)
+    lines = [f"v {x} {y} {z}" for x, y, z in shape[0]] + [f"f {a} {b} {c}" for a, b, c in np.asarray(shape[1]) + 1]
+    path.write_text("\n".join(lines))
+    assert load_mesh(path, "mm").diagnosis.watertight
+    path.write_text("\n".join([*lines, end]))
+    assert len(shape[0]) == 162
+    for repair in (False,) if "f" in end else (False, True):
+        with pytest.raises(MeshError, match="the last line has no end"):
             load_mesh(path, "mm", repair=repair)
 
 

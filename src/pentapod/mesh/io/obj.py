@@ -65,9 +65,11 @@ def _read(path: Path, data: bytes, options: ReadOptions) -> MeshData:
     faces = _facets(path, data, text, places)
     _check_announced(path, text, len(vertices), len(faces))
     notes = _unused(path, text, vertices, faces, loose=options.loose)
-    if data[-1:] not in (b"\n", b"\r") and not _is_closed(vertices, faces):
-        if notes or not _ends_whole(text):
+    if data[-1:] not in (b"\n", b"\r"):
+        if notes or not _ends_with_facet(text):
             check_last_line(path, data)
+        if _is_closed(vertices, faces):
+            return MeshData(vertices, faces, notes)
         if not options.loose:
             check_last_line(path, data, "; where it is complete, repair = true takes it as it is")
         notes = (UNENDED,)
@@ -165,15 +167,11 @@ def _is_closed(vertices: Floats, faces: Ints) -> bool:
     return bool(np.array_equal(np.sort(there[proper]), np.sort(back[proper])))
 
 
-def _ends_whole(text: bytes) -> bool:
-    """Return whether the last line can be whole without an end, as many programs leave it: no vertex, or a part of one.
-
-    A facet has corners of the same form.
-    """
-    last = text[max(text.rfind(b"\n"), text.rfind(b"\r")) + 1 :]
-    facet = _FACET.match(last)
+def _ends_with_facet(text: bytes) -> bool:
+    """Return whether the last line is a facet whose corners have the same form: then it may be whole without an end."""
+    facet = _FACET.match(text[max(text.rfind(b"\n"), text.rfind(b"\r")) + 1 :])
     if facet is None:
-        return _VERTEX.match(last) is None
+        return False
     return len({(corner.count(b"/"), corner.endswith(b"/")) for corner in facet[1].split()}) == 1
 
 

@@ -15,7 +15,7 @@ from pentapod.geometry.polyline import arc_length
 class FreeSpaceOptions:
     """Limits of a search in the free-space diagram.
 
-    cells: that one search may look at, of five bytes each; a million take a second at most. rounds, window: of the
+    cells: that one search may look at, of five bytes each; a million take about a second. rounds, window: of the
     search that widens the radius where the motion leaves the path: how often, and how many samples at first. In all
     these rounds it may look at `widened` cells, and `each` more for each sample.
     """
