@@ -198,7 +198,7 @@ def body_reaches(
                 tips += corner[open_]  # so that the rounding touches where the tool leans
             high = np.einsum("ij,ij->i", tips, axes[open_]) >= lowest - options.slack_m
             open_, tips = open_[high], tips[high]
-            for way in (0.0, length):  # on its way out, and before that where it stands: there most are told, and quickly
+            for way in (0.0, length):  # first where it stands: that tells most of them quickly
                 both = np.stack([tips, tips + way * axes[open_]], axis=1).reshape(-1, 3)
                 turned = np.repeat(axes[open_], 2, axis=0)
                 free = ~meets(surface.tree, body, both, turned, threshold=options.depth_m, every=2)
