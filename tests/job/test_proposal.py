@@ -144,6 +144,11 @@ def test_a_narrow_part_gets_a_narrow_ball(tmp_path):
     assert job.tool.diameter_mm == 2.0
 
 
+def test_the_height_of_a_pole_counts_for_its_ball(tmp_path):
+    job, _ = proposed(tmp_path, trimesh.creation.capsule(height=50.0, radius=7.5))
+    assert job.tool.diameter_mm == 6.0
+
+
 def test_walls_are_machined_down_to_where_the_ball_would_reach_into_the_table(tmp_path):
     job, proposal = proposed(tmp_path, SHAPES["block"][0]())
     mesh, ball = job_mesh(job), 0.5e-3 * job.tool.diameter_mm
@@ -250,7 +255,7 @@ def test_a_part_that_needs_repair_is_repaired_and_that_is_told(tmp_path):
     flat = trimesh.Trimesh(**trimesh.triangles.to_kwargs(many), process=False)
     job, proposal = proposed(tmp_path, flat)
     assert job.part.repair
-    assert "1 span no surface" in " ".join(proposal.remarks)
+    assert "facets without area: 1" in " ".join(proposal.remarks)
     job_mesh(job)
 
 

@@ -62,8 +62,9 @@ def cutter_for(mesh: Mesh, patch: Patch, direction: Floats, *, stands: bool) -> 
 
 def _usual(patch: Patch, direction: Floats) -> float:
     """Return the usual diameter of a ball for a region, mm."""
-    points = patch.vertices[np.unique(patch.faces)] @ np.stack(tangent_frame(direction)).T
-    least, most = np.sort(from_si(np.ptp(points, axis=0), "mm"))
+    points = patch.vertices[np.unique(patch.faces)] @ np.stack([*tangent_frame(direction), direction]).T
+    across, along, high = from_si(np.ptp(points, axis=0), "mm")
+    least, most = min(across, along), max(across, along, high)
     largest = min(OPTIONS.cutter * most, OPTIONS.narrow * least)
     return max((size for size in OPTIONS.diameters if size <= largest), default=OPTIONS.diameters[0])
 

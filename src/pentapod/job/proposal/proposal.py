@@ -56,7 +56,7 @@ def propose(part: Path, machine: Machine, name: str) -> Proposal:
         reasons["part", "unit"] = f"a guess: the file does not say it; the part is {size} mm then"
     if broken:
         table["repair"], reasons["part", "repair"] = True, broken
-        remarks.append(f"repair = true, because {broken}")
+        remarks.append(f"repair = true: {broken}")
     side, flipped = _side(mesh)
     if flipped:
         table["flip"], mesh = True, mesh.flipped()

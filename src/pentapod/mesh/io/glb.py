@@ -32,7 +32,8 @@ def _read(path: Path, _data: bytes, _options: ReadOptions) -> MeshData:
         script, path, (MOST_FACETS,), ("vertices", "facets"), MeshError, limits.seconds, limits.memory
     )
     if isinstance(made, str):
-        raise MeshError(f"cannot be read as GLB: {made or 'it is broken'}", file=path, remedy=EXPORT_AGAIN)
+        what, _, remedy = made.partition("\t")
+        raise MeshError(f"cannot be read as GLB: {what or 'it is broken'}", file=path, remedy=remedy or EXPORT_AGAIN)
     return MeshData(made["vertices"], made["facets"].astype(np.intp), (UP,), "m")
 
 

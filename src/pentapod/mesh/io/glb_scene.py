@@ -1,7 +1,7 @@
 """Script that reads the facets of a GLB file by trimesh, in a process of its own: a hostile file may not end.
 
 Arguments: the file, the .npz to write, the largest number of facets. Exit code 4: the last line of stderr says what is
-wrong.
+wrong, and after a tab what helps.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_mesh_quantizat
 """Beginnings of the names of extensions that leave the vertices as they are."""
 
 
-def refuse(what: str) -> None:
-    """End the process with a message."""
-    sys.stderr.write(f"\n{what}\n")
+def refuse(what: str, remedy: str = "") -> None:
+    """End the process with what is wrong, and what helps."""
+    sys.stderr.write(f"\n{what}\t{remedy}\n")
     sys.exit(REFUSED)
 
 
@@ -32,24 +32,24 @@ def check(data: bytes) -> None:
     """Refuse what trimesh would read with facets left out or at wrong places."""
     header: dict[str, Any] = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
     if any("uri" in buffer for buffer in header.get("buffers", [])):
-        refuse("its vertices are in another file; export one file")
+        refuse("its vertices are in another file", "export one file (.glb) with everything in it")
     unknown = [name for name in header.get("extensionsRequired", []) if not name.startswith(HARMLESS)]
     if unknown:
         refuse(f"it needs an extension that is not read: {unknown[0]}")
     if any(
         "skin" in node or "EXT_mesh_gpu_instancing" in node.get("extensions", {}) for node in header.get("nodes", [])
     ):
-        refuse("it holds bodies that are bent by a skeleton, or placed by a list; export plain bodies")
+        refuse("it holds bodies that are bent by a skeleton, or placed by a list", "export plain bodies")
     accessors = header.get("accessors", [])
     for mesh in header.get("meshes", []):
         for primitive in mesh["primitives"]:
             places = [primitive["attributes"]["POSITION"], *([primitive["indices"]] if "indices" in primitive else [])]
             if primitive.get("mode", TRIANGLES[0]) not in TRIANGLES:
-                refuse("it holds lines, points or fans; export triangles alone")
+                refuse("it holds lines, points or fans", "export triangles alone")
             if any("bufferView" not in accessors[place] or "sparse" in accessors[place] for place in places):
-                refuse("its vertices are compressed, or stored as changes; export them plainly")
+                refuse("its vertices are compressed, or stored as changes", "export them plainly")
             if "targets" in primitive or accessors[places[0]].get("normalized", False):
-                refuse("its vertices are moved by weights, or stored as shares; export them plainly")
+                refuse("its vertices are moved by weights, or stored as shares", "export them plainly")
 
 
 def main(source: str, target: str, most: int) -> None:

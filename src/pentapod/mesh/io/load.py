@@ -81,9 +81,11 @@ def load_mesh(
         notes=(*notes, *told), exact_normals=normals, progress=progress,
     )  # fmt: skip
     degenerate, duplicated = mesh.diagnosis.degenerate, mesh.diagnosis.duplicated
+    counts = (("facets without area", degenerate), ("duplicate facets", duplicated))
+    faults = [f"{what}: {many:,} of {len(faces):,}" for what, many in counts if many]
     if not repair and degenerate + duplicated > PLAUSIBLE.most_dropped * len(faces):
         raise MeshError(
-            f"of {len(faces):,} facets {degenerate:,} span no surface and {duplicated:,} are duplicates",
+            ", ".join(faults),
             file=path,
             expected=f"at most {PLAUSIBLE.most_dropped:.0%}",
             remedy="export the mesh again; where it is complete, repair = true drops these facets",
