@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pentapod.base.arrays import Floats
-from pentapod.numerics.kernels import kernel
+from pentapod.numerics.kernels import inlined_kernel, kernel
 
 AXIS = 3
 """Index of the axis in a pose."""
@@ -25,7 +25,7 @@ LEAST_STEP = 0.05
 """Share of what is left of the times by which each of its steps shortens that at least."""
 
 
-@kernel
+@inlined_kernel
 def meridian_distance(solid: Floats, r: float, z: float) -> tuple[float, float, float]:
     """Return the signed distance of (r, z), radius and height, from a solid (5,), and its derivatives by r and z."""
     low, high, low_radius, high_radius, rounding = solid[0], solid[1], solid[2], solid[3], solid[4]
@@ -77,7 +77,7 @@ def pose_at(motion: Floats, t: float, pose: Floats) -> None:
             pose[3 + k] = first * motion[3 + k] + second * motion[9 + k]
 
 
-@kernel
+@inlined_kernel
 def derivatives(solid: Floats, motion: Floats, pose: Floats, x: float, y: float, z: float, g: Floats) -> None:
     """Write into g (6,): the gradient in the mesh's frame, f, ∂f/∂t and W, at a mesh point and a pose."""
     wx, wy, wz = x - pose[0], y - pose[1], z - pose[2]
@@ -139,7 +139,7 @@ def lowest_on_way(
     return best, at
 
 
-@kernel
+@inlined_kernel
 def above_base(solid: Floats, motion: Floats, pose: Floats, x: float, y: float, z: float, g: Floats) -> None:
     """Write into g (6,), as `derivatives`, the height of a mesh point below the plane that the solid stands on.
 
@@ -153,7 +153,7 @@ def above_base(solid: Floats, motion: Floats, pose: Floats, x: float, y: float, 
     _point_moves(motion, wx, wy, wz, g)
 
 
-@kernel
+@inlined_kernel
 def _point_moves(motion: Floats, wx: float, wy: float, wz: float, g: Floats) -> None:
     """Write ∂f/∂t and W into g (6,): the body moves with velocity V + ω × w, in its frame the point the other way."""
     vx = motion[6] + motion[13] * wz - motion[14] * wy

@@ -17,7 +17,7 @@ from pentapod.mesh.query.kernels.body_kernels import (
     pose_at,
 )
 from pentapod.mesh.query.kernels.rest_kernels import into_frame, lowest_on_facet, told_at_once
-from pentapod.numerics.kernels import kernel
+from pentapod.numerics.kernels import inlined_kernel, kernel
 
 STACK = 512
 """Pieces that wait to be searched: far more than halving a kilometre down to a tenth of a micrometre needs."""
@@ -181,7 +181,7 @@ def _above_base(solid: Floats, motion: Floats, pose: Floats, piece: Floats, each
     return lowest + min(g[RATE], 0.0)
 
 
-@kernel
+@inlined_kernel
 def counts_below(best: Floats, eps: float) -> float:
     """Return the lower bound from which on a piece holds nothing that counts as deeper."""
     return best[0] - eps + RELATIVE_ERROR * min(best[0], 0.0)

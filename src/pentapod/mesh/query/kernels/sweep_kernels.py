@@ -36,7 +36,7 @@ from pentapod.mesh.query.kernels.facet_kernels import (
     deepest_in_facet,
     deepest_in_facet_at_rest,
 )
-from pentapod.numerics.kernels import kernel
+from pentapod.numerics.kernels import inlined_kernel, kernel
 
 
 @kernel
@@ -51,7 +51,7 @@ def _above_box(solid: Floats, motion: Floats, pose: Floats, box: Floats, tau: fl
     return g[VALUE] - _fall(box, g) - off
 
 
-@kernel
+@inlined_kernel
 def _fall(box: Floats, g: Floats) -> float:
     """Return by how much a plane with gradient g falls from the middle of a box (15,) to its lowest corner."""
     fall = 0.0
@@ -73,7 +73,7 @@ def _about_box(
     return float(deviation_bound(motion, g, tau, box_radius(box)))
 
 
-@kernel
+@inlined_kernel
 def _children(node: int, boxes: Floats, g: Floats) -> tuple[int, int]:
     """Return both children of a node; last, to be searched first, that with the deeper centre: it prunes the other."""
     left, right = 2 * node + 1, 2 * node + 2
