@@ -127,6 +127,32 @@ def test_too_few_set_ups_are_a_refusal():
     assert " 0 %" in nothing.cause
 
 
+def test_the_refusal_tells_how_much_the_allowed_set_ups_make():
+    """Slabs up to 0.3 wide, which end at multiples of 1/32: three make 27/32 of the length."""
+    path = passes([0.0, 0.1], points=101)
+    answer = setups(path, no_wider(0.3, 1.0), STYLE, 3, WHOLE)
+    assert isinstance(answer, Refusal)
+    assert " 84 % " in answer.cause
+    left = cutting_intervals(path)
+    for first, last in answer.diagnosis[0].waypoints:
+        left[first:last] = False
+        assert path.tips[first:last, 0].min() >= 27 / 32 - 0.01
+    assert left.sum() / cutting_intervals(path).sum() == pytest.approx(0.84, abs=0.01)
+
+
+def test_how_far_the_last_set_up_reaches_is_searched_for_one_partition_alone():
+    """Eight set-ups are too few for 4 by 4 tiles: a dozen searches fewer than where each scheme asks for that."""
+    asked, small = [], no_wider(0.3, 0.3)
+
+    def fits(part: Toolpath) -> bool:
+        asked.append(part)
+        return small(part)
+
+    path = passes(np.linspace(0.0, 1.0, 51).tolist(), points=51)
+    assert isinstance(setups(path, fits, STYLE, 8, WHOLE), Refusal)
+    assert len(asked) <= 62
+
+
 def test_progress_tells_the_way_and_how_far():
     told: list[tuple[str, float, str]] = []
     path = passes([0.0, 0.4, 0.8])

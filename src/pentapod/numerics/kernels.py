@@ -1,6 +1,6 @@
 """Kernels compiled by numba: plain loops over up to a million poses or gridpoints.
 
-Files named `*_kernels.py` hold them, each function marked with `kernel`; they are imported where they are first used,
+Files named `*_kernels.py` hold them, each function marked with `kernel` or `inlined_kernel`; they are imported where they are first used,
 so that `import pentapod` stays light. The machine code is cached on disk (`kernel_cache`): only the first run of a
 version on a machine compiles, and says so to the log `pentapod`.
 

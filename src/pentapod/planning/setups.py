@@ -78,7 +78,11 @@ def _schemes(toolpath: Toolpath, most: int) -> Iterator[_Scheme]:
 
 @dataclass(eq=False)
 class _Search:
-    """Searches for partitions; reached (N − 1,): the cuts of the one so far that leaves the fewest over."""
+    """Searches for partitions.
+
+    ended: schemes with too few pieces: the cuts (N − 1,) of all slabs but a last one, and where that begins; None where
+    nothing fits there.
+    """
 
     toolpath: Toolpath
     fits: Fits
@@ -87,25 +91,24 @@ class _Search:
 
     def __post_init__(self) -> None:
         self.cutting = cutting_intervals(self.toolpath)
-        self.reached: Bools = np.zeros_like(self.cutting)
+        self.ended: list[tuple[Bools, _Scheme, int | None]] = []
 
     def split(self, scheme: _Scheme, most: int) -> tuple[Piece, ...]:
         """Return the fewest pieces of one scheme, at most `most`; none where they are not enough."""
         pieces: list[Piece] = []
         reached, start, slabs = np.zeros_like(self.cutting), 0, 0
         while start < len(scheme.ends):
-            found = None
-            if len(pieces) + scheme.columns <= most:
-                self.progress("set-ups", float(reached.mean() / self.cutting.mean()), f"{scheme.name}: {slabs} so far")
-                found = self._furthest(scheme, start)
+            room = (most - len(pieces)) // scheme.columns
+            self.progress("set-ups", float(reached.mean() / self.cutting.mean()), f"{scheme.name}: {slabs} so far")
+            # How far the last slab reaches matters only where there is no partition.
+            found = self._furthest(scheme, start, rest=start > 0) if room > 1 else self._rest(scheme, start)
             if found is None:
-                self.reached = max(self.reached, reached, key=np.count_nonzero)
+                self.ended.append((reached, scheme, start if room == 1 else None))
                 return ()
             (start, more), slabs = found, slabs + 1
             pieces += more
             for piece in more:
                 reached |= piece.cuts(self.toolpath)
-        self.reached = reached
         even = self._even(scheme, slabs)
         return tuple(even if 0 < len(even) <= len(pieces) else pieces)
 
@@ -115,19 +118,35 @@ class _Search:
         pieces = [piece for a, b in pairwise(edges) if b > a for piece in self._pieces(scheme, a, b - 1)]
         return pieces if self._all_fit(pieces) else []
 
+    def _rest(self, scheme: _Scheme, start: int) -> tuple[int, list[Piece]] | None:
+        """As `_furthest`, for the last slab that may be: all that is left, or nothing."""
+        pieces = self._pieces(scheme, start, len(scheme.ends) - 1)
+        return (len(scheme.ends), pieces) if self._all_fit(pieces) else None
+
+    def most_reached(self) -> Bools:
+        """Return the cuts of the best partition, its last slab as large as fits."""
+        reached, scheme, start = max(self.ended, key=lambda each: (np.count_nonzero(each[0]), each[2] is not None))
+        last = None if start is None else self._furthest(scheme, start, rest=False)
+        for piece in () if last is None else last[1]:
+            reached = reached | piece.cuts(self.toolpath)
+        return reached
+
     def _all_fit(self, pieces: list[Piece]) -> bool:
         return all(self.fits(part_of(self.toolpath, piece, self.style)) for piece in pieces)
 
-    def _furthest(self, scheme: _Scheme, start: int) -> tuple[int, list[Piece]] | None:
-        """Return the index after the last end that fits, at `start` or later, and the pieces; by bisection."""
-        # The whole is known not to fit, nor in columns: slabs across the other direction would have fitted.
-        low, high, best = start - 1, len(scheme.ends) - (start == 0), None
+    def _furthest(self, scheme: _Scheme, start: int, *, rest: bool) -> tuple[int, list[Piece]] | None:
+        """Return the index after the last end that fits, at `start` or later, and the pieces; by bisection.
+
+        rest: whether all that is left may fit. The whole does not, nor in columns: slabs across the other direction
+        would have fitted.
+        """
+        low, high, best = start - 1, len(scheme.ends) - (not rest), None
         middle = start  # the smallest piece first: if it does not fit, none does
         while high - low > 1:
             pieces = self._pieces(scheme, start, middle)
             if self._all_fit(pieces):
                 # Then the whole rest, which often fits.
-                low, middle = middle, (middle + high) // 2 if middle > start or start == 0 else high - 1
+                low, middle = middle, high - 1 if rest and middle == start else (middle + high) // 2
                 best = (low + 1, pieces)
             elif middle == start:
                 return None
@@ -161,8 +180,9 @@ def _bounded(piece: Piece, along: int, low: float, high: float) -> Piece:
 
 def _refusal(search: _Search, most: int, whole: Refusal) -> Refusal:
     """Return the refusal of a path in set-ups: the cuts left over, and the diagnosis of the whole."""
-    left = tuple((a, b) for a, b in marked_runs(search.cutting & ~search.reached).tolist())
-    share = 100.0 * float(search.reached.sum() / search.cutting.sum())
+    made = search.most_reached()
+    left = tuple((a, b) for a, b in marked_runs(search.cutting & ~made).tolist())
+    share = 100.0 * float(made.sum() / search.cutting.sum())
     reached = f"the best partition found makes {share:.0f} % of the cuts"
     cause = f"{most} set-ups are not enough: {reached}; in one set-up {whole.cause}"
     over = Shortfall(f"beyond {most} set-ups", left, 0.0, "")
