@@ -1,8 +1,8 @@
 """Kernels compiled by numba: plain loops over up to a million poses or gridpoints.
 
-Files named `*_kernels.py` hold them, each function marked with `kernel` or `inlined_kernel`; they are imported where they are first used,
-so that `import pentapod` stays light. The machine code is cached on disk (`kernel_cache`): only the first run of a
-version on a machine compiles, and says so to the log `pentapod`.
+Files named `*_kernels.py` hold them, each function marked with `kernel` or `inlined_kernel`; they are imported
+where they are first used, so that `import pentapod` stays light. The machine code is cached on disk (`kernel_cache`):
+only the first run of a version on a machine compiles, and says so to the log `pentapod`.
 
 Loading numba and a kernel takes 0.4 s, as long as NumPy needs for ten million poses. So leg lengths and poses of the
 quadratic family have a second form in NumPy, equal to the last bit: with kernels alone `pentapod ik` would take 1.1 s
