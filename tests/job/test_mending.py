@@ -148,7 +148,8 @@ def test_advice_gets_how_much_more_than_a_run_leaves_out_by_itself_is_out_of_lim
     assert more_left_out(job, whole, few, 0.05) == share
     assert more_left_out(job, whole, few, 0.9 * share) is None
     tolerant = Job.from_dict({**TABLES, "tolerance": {"left_share": share}}, job.mesh_path.parent)
-    assert more_left_out(tolerant, whole, few, 0.05) is None
+    assert more_left_out(tolerant, whole, few, 0.05) == most_left_out(tolerant)  # that was left out, and did not help
+    assert more_left_out(tolerant, whole, few, 0.9 * most_left_out(tolerant)) is None
     lines = {**TABLES, "toolpath": {"strategy": "edges"}}
     assert more_left_out(Job.from_dict(lines, job.mesh_path.parent), whole, few, 0.05) is None
     assert more_left_out(job, whole, replace(few, stages=few.stages[:1]), 0.05) is None

@@ -155,15 +155,16 @@ def most_left_out(job: Job, options: MendOptions = OPTIONS) -> float:
 
 
 def more_left_out(job: Job, whole: Toolpath, outcome: Outcome, most: float) -> float | None:
-    """Return the share of its cuts at which a job's placement exceeds limits, up to `most`.
+    """Return the share of its cuts to leave out where a job's placement exceeds limits at few places, up to `most`.
 
-    None where it is more, or so little that a run leaves it out by itself, or where no claim judges what is left.
+    At least what a run leaves out by itself: it did so, and other places were out of limits then. None where it is
+    more, or where no claim judges what is left.
     """
     own = most_left_out(job)
     if own == 0.0 or outcome.refusal is None or outcome.refusal.stage != "placement":
         return None
     mend = mend_of(whole, None, outcome, most)
-    return mend.share if mend is not None and mend.share > own else None
+    return max(mend.share, own) if mend is not None and own <= most else None
 
 
 def other_way(

@@ -47,7 +47,7 @@ class FailedClaims:
     """Trials for the claims of a job that fail, by name. toolpath: the job's, which its program follows.
 
     left: percent of the region that is left where a run does the job in another way, if nothing else fails there.
-    leaves: share of the cuts at the few places where its placement exceeds limits, if a run would not leave them out.
+    leaves: share of the cuts at the few places where its placement exceeds limits, if no plan leaves them out yet.
     """
 
     job: Job
