@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_mesh
 from pentapod.job.mending import FailedMend, mend_of, more_left_out, most_left_out
 from pentapod.job.outcome import Outcome, Stage
-from pentapod.job.pipeline import attempt
+from pentapod.job.pipeline import attempt, stages
 from pentapod.machine.machine import Machine
 from pentapod.program import write_csv
 from pentapod.toolpath import SegmentKind
@@ -188,6 +189,30 @@ def test_a_mend_after_which_too_much_is_left_is_told_and_may_be_advised(dome, tm
     (said,) = (stage.remark for stage in done.stages if isinstance(stage.value, FailedMend))
     assert "are left out, because they cannot be done: tool body touches the part. It failed, too: verdict" in said
     assert not (tmp_path / "out" / "program.csv").exists()
+
+
+@pytest.mark.parametrize("programmed", [True, False])
+def test_advice_may_leave_out_more_where_no_program_left_out_the_few_places(dome, tmp_path, monkeypatch, programmed):
+    """As above; or what is kept is refused for hundreds of other waypoints."""
+    job, *_ = dome
+    asked, short = [], motion()[0]
+
+    def program(self, file):
+        if self.left_out and programmed:
+            write_csv(short, file)
+            return short
+        return self.runner.run("placement", lambda: refused((200, 900) if self.left_out else (123, 125)))
+
+    def advised(*_, leaves, **__):
+        asked.append(leaves)
+        return SimpleNamespace(advice=(), sentence="nothing was found")
+
+    left = Certificate(SURFACE_LEFT, False, 0.3, 0.1, "%", Place(), "")
+    monkeypatch.setattr(task.Task, "program", program)
+    monkeypatch.setattr(attempt, "judged", lambda *_, **__: Verdict((left,)))
+    monkeypatch.setattr(stages, "advised", advised)
+    assert run(job, tmp_path / "out").refusal.stage == "placement"
+    assert asked == [None if programmed else most_left_out(job)]
 
 
 @pytest.mark.slow
