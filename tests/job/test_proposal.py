@@ -145,8 +145,11 @@ def test_a_narrow_part_gets_a_narrow_ball(tmp_path):
 
 
 def test_the_height_of_a_pole_counts_for_its_ball(tmp_path):
-    job, _ = proposed(tmp_path, trimesh.creation.capsule(height=50.0, radius=7.5))
-    assert job.tool.diameter_mm == 6.0
+    """A pole on a plate, of which a box at the pole is machined from above: the work volume is not as high."""
+    plate, pole = trimesh.creation.box((105, 105, 20)), trimesh.creation.capsule(height=150.0, radius=7.5)
+    job, _ = proposed(tmp_path, trimesh.util.concatenate([plate, pole]))
+    assert job.part.region_box_mm[0][2] > 10.0
+    assert job.tool.diameter_mm >= 4.0
 
 
 def test_walls_are_machined_down_to_where_the_ball_would_reach_into_the_table(tmp_path):
