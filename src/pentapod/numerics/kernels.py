@@ -65,8 +65,8 @@ def kernel(function: _Function) -> _Function:
 def inlined_kernel(function: _Function) -> _Function:
     """As `kernel`; where kernels call it, it becomes part of them. For short functions with arrays, in inner loops.
 
-    A call hands over seven words for each array, and counts references to it. So searches for the deepest facet take
-    0.6 of the time, with results equal to the last bit. Of long functions only what is compiled grows.
+    A call passes seven numbers for each array, and counts references to it. Without such calls searches for the
+    deepest facet take 0.6 to 0.8 of the time, with equal bits. Long functions gain nothing, and compile longer.
     """
     return _compiled(function, inlined=True)
 

@@ -99,8 +99,8 @@ def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried],
     left = min((each for each in lefts if each is not None), default=None)
     meets = next((way.meets for way in ways if way.meets), ())
     about = (failed, refusal.diagnosis, own, left, meets)
-    few = not any(isinstance(stage.value, FailedMend) for stage in runner.stages)
-    leaves = more_left_out(task.job, task.toolpath, outcome, options.little / options.more) if few else None
+    mended = any(isinstance(stage.value, FailedMend) for stage in runner.stages)  # then it is known what is left
+    leaves = None if mended else more_left_out(task.job, task.toolpath, outcome, options.little / options.more)
     found = runner.run("advice", lambda: advised(*search, *about, forbidden=forbidden, leaves=leaves))
     better = refusal.with_advice(found.advice, found.sentence)
     runner.stages = [s if s.value is not refusal else s.with_value(better) for s in runner.stages]

@@ -35,7 +35,7 @@ def check(data: bytes) -> None:
         refuse("its vertices are in another file", "export one file (.glb) with everything in it")
     unknown = [name for name in header.get("extensionsRequired", []) if not name.startswith(HARMLESS)]
     if unknown:
-        refuse(f"it needs an extension that is not read: {unknown[0]}")
+        refuse(f"it needs an extension that is not read: {unknown[0]}", "export without compression and extensions")
     if any(
         "skin" in node or "EXT_mesh_gpu_instancing" in node.get("extensions", {}) for node in header.get("nodes", [])
     ):
@@ -59,7 +59,7 @@ def main(source: str, target: str, most: int) -> None:
     scene = trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False, skip_materials=True)
     placed = [scene.graph[node] for node in scene.graph.nodes_geometry]
     if sum(len(scene.geometry[name].faces) for _, name in placed) > most:
-        refuse(f"it unfolds to more than {most:,} facets")
+        refuse(f"it unfolds to more than {most:,} facets", "export fewer facets, or fewer copies")
     points, facets, count = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], 0
     for matrix, name in placed:
         body = scene.geometry[name]
