@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pentapod.base.errors import ProgramError, ToolpathError
+from pentapod.base.progress import silent
 from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.cli.commands.new import dome_stl
 from pentapod.job import Job, run, task
@@ -213,6 +214,38 @@ def test_advice_may_leave_out_more_where_no_program_left_out_the_few_places(dome
     monkeypatch.setattr(stages, "advised", advised)
     assert run(job, tmp_path / "out").refusal.stage == "placement"
     assert asked == [None if programmed else most_left_out(job)]
+
+
+def test_a_plan_for_advice_that_may_leave_more_goes_on_from_the_run(dome, tmp_path, monkeypatch):
+    """What it makes first is known to have no placement; then it is as a run of that job, and leaves no files."""
+    job, *_ = dome
+    planned, ended, short = [], [], motion()[0]
+    more = job.with_(tolerance={"left_share": 0.0125})
+
+    def program(self, file):
+        planned.append(self.left_out)
+        if len(self.left_out) < 3:
+            return self.runner.run("placement", lambda: refused((900, 910) if self.left_out else (123, 125)))
+        write_csv(short, file)
+        return short
+
+    def advised(*search, **_):
+        ended.append(search[4](more, silent))
+        return SimpleNamespace(advice=(), sentence="nothing was found")
+
+    monkeypatch.setattr(task.Task, "program", program)
+    monkeypatch.setattr(
+        attempt, "judged", lambda *_, **__: Verdict((Certificate("all", True, 0.0, 0.1, "", Place(), ""),))
+    )
+    monkeypatch.setattr(stages, "advised", advised)
+    assert run(job, tmp_path / "out").refusal.stage == "placement"
+    assert not (tmp_path / "out" / "program.csv").exists()
+    assert [each.stage for each in ended] == [None]
+    assert [len(left_out) for left_out in planned] == [0, 2, 3]
+    found = list(planned)
+    planned.clear()
+    assert run(more, tmp_path / "more").passed
+    assert planned == found
 
 
 @pytest.mark.slow

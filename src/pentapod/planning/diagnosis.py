@@ -57,7 +57,7 @@ def refusal(values: Floats, attempt: PlacedPath, margins: Margins, needed: float
     where = "at the given placement" if fixed else "at the best placement found"
     return UnplacedPath(
         "placement",
-        f"the part does not fit the machine {where}: {short} of {len(values)} waypoints are out of limits",
+        f"the part does not fit the machine {where}: {short:,} of {len(values):,} waypoints are out of limits",
         diagnose(values, margins, needed),
         attempt=attempt,
     )

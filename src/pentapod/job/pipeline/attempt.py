@@ -14,6 +14,7 @@ from pentapod.job.build.left import foreseen
 from pentapod.job.build.limits import pose_limits
 from pentapod.job.build.pieces import job_piece
 from pentapod.job.build.toolpath import Reports, job_toolpath
+from pentapod.job.mending import Mend
 from pentapod.job.outcome import Outcome, Stage, refusal_verdict
 from pentapod.job.plan_arrays import array_parts
 from pentapod.job.plan_before import PlanBefore
@@ -62,13 +63,15 @@ def made_toolpath(
 class Attempt:
     """A plan of a job in one way.
 
-    mesh: of the job's part. staging: the folder for its files. writers: further files, by name.
+    mesh: of the job's part. staging: the folder for its files. writers: further files, by name. unplaced: outcomes of
+    mends for which no placement was found, whatever may be left of the region.
     """
 
     task: Task
     mesh: Mesh
     staging: Path
     writers: Mapping[str, Writer]
+    unplaced: dict[Mend, Outcome] = dataclasses.field(default_factory=dict)
 
     @property
     def runner(self) -> StageRunner:
@@ -77,7 +80,7 @@ class Attempt:
 
     def with_task(self, **changes: Any) -> Self:
         """Return the attempt at a task with some fields changed."""
-        return dataclasses.replace(self, task=dataclasses.replace(self.task, **changes))
+        return dataclasses.replace(self, task=dataclasses.replace(self.task, **changes), unplaced={})
 
     def foreseen(self, *, upright: bool) -> Outcome | None:
         """Return the outcome of a toolpath whose program would fail its verdict; None where that is not known yet.
@@ -141,17 +144,19 @@ class Attempt:
         file = self.staging / WITHHELD
         return file.read_bytes() if file.is_file() else None
 
-    def tried_with(self, share: float, outcome: Outcome) -> Tried:
-        """Return how the job ends where a share of the region may be left: a plan writes the program that is withheld.
-
-        outcome: of the job, whose program fails in this alone.
-        """
+    def leaving(self, job: Job, **changes: Any) -> Self:
+        """Return the attempt at the same job where another share of the region may be left. changes: of the task."""
         specification = self.task.specification
         cutting = specification.cutting
         if cutting is not None and cutting.coverage is not None:
-            cutting = dataclasses.replace(cutting, coverage=dataclasses.replace(cutting.coverage, share=share))
-        specification = dataclasses.replace(specification, cutting=cutting)
-        verdict = judged(self.staging / WITHHELD, specification, claims=self.task.claims)
+            coverage = dataclasses.replace(cutting.coverage, share=job.tolerance.left_share)
+            cutting = dataclasses.replace(cutting, coverage=coverage)
+        changes |= {"job": job, "specification": dataclasses.replace(specification, cutting=cutting)}
+        return dataclasses.replace(self, task=dataclasses.replace(self.task, **changes))
+
+    def judged_again(self, outcome: Outcome) -> Tried:
+        """Return how the job ends: a plan writes the program that was withheld. outcome: of the run that wrote it."""
+        verdict = judged(self.staging / WITHHELD, self.task.specification, claims=self.task.claims)
         failed = frozenset(failures(verdict))
         return Tried(None, outcome.margin) if verdict.passed else Tried(STAGE, failed=failed)
 

@@ -25,14 +25,14 @@ ANOTHER_WAY = "another way"
 """Name of the stage that says in which other way a job is done."""
 
 
-def first_that_passes(attempt: Attempt) -> Outcome:
+def first_that_passes(attempt: Attempt, outcome: Outcome | None = None) -> Outcome:
     """Return the outcome of a job that may be done in other ways: the first that passes, else why it failed as asked.
 
     The stages of that run are those of the attempt's runner afterwards. A bull or flat end whose axes along the normals
-    would leave out much stands upright at first.
+    would leave out much stands upright at first. outcome: of the job as asked, where it is known.
     """
     upright = ends(attempt.task.job) and may_stand(attempt.task.job)
-    outcome = attempt.foreseen(upright=upright) or attempt.planned()
+    outcome = outcome or attempt.foreseen(upright=upright) or attempt.planned()
     if outcome.refusal is None:
         return outcome
     outcome = mended(attempt, outcome)
@@ -63,7 +63,9 @@ def mended(attempt: Attempt, failed: Outcome) -> Outcome:
         if mend is None:
             break
         again = _changed(attempt, outcome, Mend() if before is None else before, mend)
-        outcome = again.planned()
+        outcome = attempt.unplaced[mend] if mend in attempt.unplaced else again.planned()
+        if outcome.refusal is not None and outcome.refusal.stage == "placement":
+            attempt.unplaced[mend] = outcome
         if outcome.passed:
             runner.stages = again.runner.stages
             return outcome

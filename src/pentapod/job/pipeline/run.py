@@ -117,12 +117,7 @@ def tried(job: Job, progress: Progress = silent, **given: Any) -> Tried:
     """
     with tempfile.TemporaryDirectory() as folder:
         _, outcome = _attempted(job, Path(folder), ending_when_interrupted(progress), **given)
-    if outcome.passed:
-        return Tried(None, outcome.margin)
     # Loaded by the run.
-    from pentapod.job.mending import FailedWay  # noqa: PLC0415
-    from pentapod.job.withheld import failures  # noqa: PLC0415
+    from pentapod.job.pipeline.stages import tried_of  # noqa: PLC0415
 
-    stage = "verdict" if outcome.refusal is None else outcome.refusal.stage
-    way = outcome.find(FailedWay)
-    return Tried(stage, failed=frozenset(failures(outcome.verdict)) if way is None else way.claims)
+    return tried_of(outcome)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from pentapod.job.pipeline.attempt import Attempt, Writer, made_toolpath
 from pentapod.job.pipeline.other_attempts import first_that_passes
 from pentapod.job.plan_before import PlanBefore
 from pentapod.job.schema.job import Job
-from pentapod.job.stage_runner import StageRunner
+from pentapod.job.stage_runner import StageRunner, ending_when_interrupted
 from pentapod.job.task import Task
 from pentapod.job.ways.names import FILES
 from pentapod.job.withheld import STAGE, failures
@@ -84,11 +85,18 @@ def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried],
     failed = failures(outcome.verdict) if refusal.stage == STAGE else {}
 
     def tried(job: Job, progress: Progress) -> Tried:
-        share = job.tolerance.left_share
-        same = job.with_(tolerance={"left_share": task.job.tolerance.left_share}).tables == task.job.tables
-        if same and frozenset(failed) == LEFT_ALONE:
-            return attempt.tried_with(share, outcome)
-        return again(job, progress)
+        if job.with_(tolerance={"left_share": task.job.tolerance.left_share}).tables != task.job.tables:
+            return again(job, progress)
+        if frozenset(failed) == LEFT_ALONE:
+            return attempt.leaving(job).judged_again(outcome)
+        if refusal.stage != "placement":
+            return again(job, progress)
+        # The plan does what this run did, and goes on from there.
+        runner = StageRunner(ending_when_interrupted(progress))
+        runner.stages = [stage for stage in outcome.stages if not isinstance(stage.value, FailedWay | FailedMend)]
+        with tempfile.TemporaryDirectory() as folder:
+            plan = dataclasses.replace(attempt.leaving(job, runner=runner), staging=Path(folder))
+            return tried_of(first_that_passes(plan, outcome))
 
     search = (task.job, task.machine, attempt.mesh, task.toolpath, tried, options, runner.progress)
     forbidden = refusal.stage == FORBIDDEN
@@ -105,6 +113,15 @@ def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried],
     better = refusal.with_advice(found.advice, found.sentence)
     runner.stages = [s if s.value is not refusal else s.with_value(better) for s in runner.stages]
     return attempt.ended(outcome.verdict) if failed else attempt.refused(better)
+
+
+def tried_of(outcome: Outcome) -> Tried:
+    """Return how a plan ended, for the search for advice."""
+    if outcome.passed:
+        return Tried(None, outcome.margin)
+    stage = "verdict" if outcome.refusal is None else outcome.refusal.stage
+    way = outcome.find(FailedWay)
+    return Tried(stage, failed=frozenset(failures(outcome.verdict)) if way is None else way.claims)
 
 
 def _split(attempt: Attempt, refusal: Refusal) -> Outcome:
