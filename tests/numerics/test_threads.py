@@ -1,13 +1,15 @@
 """in_threads: results in the order of the items, few at a time, and errors where they belong."""
 
+import os
 import threading
 import time
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
 
 from pentapod.numerics.kernels import kernels_pay, kernels_used
-from pentapod.numerics.threads import CORES, ROWS, both, cores, for_rows, in_threads
+from pentapod.numerics.threads import CORES, ROWS, both, cores, for_rows, in_threads, on_all_cores
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5, None])
@@ -71,6 +73,66 @@ def test_the_environment_says_how_many_cores_a_process_uses(monkeypatch):
     given = cores()
     monkeypatch.delenv(CORES)
     assert given == cores() >= 1
+
+
+def test_this_thread_and_helpers_that_stay_do_all_items(monkeypatch):
+    monkeypatch.setenv(CORES, "2")
+    together, named = threading.Barrier(2, timeout=10.0), set[str]()
+
+    def squared(k: int) -> int:
+        together.wait()
+        named.add(threading.current_thread().name)
+        return k * k
+
+    for _ in range(4):
+        assert on_all_cores(squared, range(8)) == [k * k for k in range(8)]
+    assert threading.current_thread().name in named
+    assert 2 <= len(named) <= 1 + (os.cpu_count() or 1)
+    monkeypatch.setenv(CORES, "1")
+    assert set(on_all_cores(lambda _: threading.current_thread(), range(3))) == {threading.current_thread()}
+    assert on_all_cores(squared, ()) == []
+
+
+def test_helpers_may_ask_for_helpers(monkeypatch):
+    monkeypatch.setenv(CORES, "4")
+
+    def sums(k: int) -> int:
+        return sum(on_all_cores(lambda n: time.sleep(1e-4) or n * k, range(5)))
+
+    for _ in range(20):
+        assert on_all_cores(sums, range(12)) == [10 * k for k in range(12)]
+    with kernels_used("never"):
+        assert on_all_cores(lambda _: time.sleep(1e-3) or kernels_pay(1e9), range(8)) == [False] * 8
+
+
+def test_an_error_in_this_thread_or_a_helper_ends_the_work(monkeypatch):
+    monkeypatch.setenv(CORES, "2")
+    for wrong in (threading.main_thread().name, "pentapod"):
+        begun = []
+
+        def fails(k: int, wrong=wrong, begun=begun) -> None:
+            begun.append(k)
+            time.sleep(1e-3)
+            if threading.current_thread().name.startswith(wrong):
+                raise ZeroDivisionError
+
+        with pytest.raises(ZeroDivisionError):
+            on_all_cores(fails, range(1000))
+        assert len(begun) < 1000
+        assert on_all_cores(lambda k: k, range(3)) == [0, 1, 2]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+def test_a_process_that_was_forked_has_helpers_of_its_own(monkeypatch):
+    monkeypatch.setenv(CORES, "2")
+    on_all_cores(lambda _: time.sleep(1e-3), range(8))  # the parent has some now
+    with get_context("fork").Pool(1) as pool:
+        assert pool.apply_async(_two_threads).get(timeout=20.0) == 2
+
+
+def _two_threads() -> int:
+    together = threading.Barrier(2, timeout=10.0)
+    return len(set(on_all_cores(lambda _: (together.wait(), threading.current_thread().name)[1], range(4))))
 
 
 @pytest.mark.parametrize(

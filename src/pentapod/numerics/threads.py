@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sized
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextvars import copy_context
-from functools import wraps
+from functools import cache, wraps
 from typing import Any, ParamSpec, TypeVar
 
 import numpy.typing as npt
@@ -65,6 +65,46 @@ def in_threads(
                 future.cancel()
 
 
+@cache
+def _helpers() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(os.cpu_count(), "pentapod")
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_helpers.cache_clear)  # threads stay with the parent
+
+
+def on_all_cores(function: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
+    """Return function(item) for all items, done by this thread and by helpers beside it; for milliseconds of kernels.
+
+    Helpers stay for later calls, and take the next item by themselves. To begin threads for each call, and to wake this
+    one for each item, costs up to half of what two cores gain on 5 ms. This thread never waits for a helper that has
+    not begun: so functions may call this again.
+    """
+    count = min(cores(), len(items))
+    if count <= 1:
+        return [function(item) for item in items]
+    found, waiting = dict[int, _Result](), iter(range(len(items)))
+
+    def work() -> None:
+        try:
+            for k in waiting:
+                found[k] = function(items[k])
+        except BaseException:
+            deque(waiting, maxlen=0)  # nothing else is begun
+            raise
+
+    helpers = [_helpers().submit(copy_context().run, work) for _ in range(count - 1)]
+    try:
+        work()
+    finally:
+        begun = [helper for helper in helpers if not helper.cancel()]
+        wait(begun)
+    for helper in begun:
+        helper.result()
+    return [found[k] for k in range(len(items))]
+
+
 def both(first: Callable[[], _Result], second: Callable[[], _Other]) -> tuple[_Result, _Other]:
     """Return what two functions return, which work beside each other where there are cores."""
     results: list[Any] = list(in_threads(lambda each: each(), (first, second)))
@@ -92,8 +132,7 @@ def for_rows(
     def done(k: slice) -> None:
         kernel(*(array[k] for array in rows), *given, *(array[k] for array in filled))
 
-    for _ in in_threads(done, list(blocks(count, size))):
-        pass
+    on_all_cores(done, list(blocks(count, size)))
 
 
 def on_one_thread(function: Callable[_P, _R]) -> Callable[_P, _R]:

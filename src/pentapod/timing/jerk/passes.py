@@ -55,11 +55,10 @@ def solve_locally(problem: Subproblem, y: Floats, x_k: Floats, stations: Floats)
     while len(stations):
         windows, last, failed = problem.windows_about(stations, reach), np.inf, np.zeros(len(stations), dtype=bool)
         for number in range(options.passes):
-            solved: list[tuple[int, int]] = []
-            for low, high in windows:
-                better = problem.solved(y, x_k, 1, low, high, (3, 3))
+            solved, before, y = list[tuple[int, int]](), y, y.copy()
+            for (low, high), better in zip(windows, problem.solved(before, x_k, 1, windows, (3, 3)), strict=True):
                 if better is not None:
-                    y = better
+                    y[low:high] = better
                     solved.append((low, high))
                 elif number == 0:
                     failed |= (stations >= problem.knots[low + 3]) & (stations <= problem.knots[high])

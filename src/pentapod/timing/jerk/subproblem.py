@@ -10,6 +10,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.numerics.threads import on_all_cores
 from pentapod.timing.jerk.interval import End, Interval
 from pentapod.timing.jerk.jerk_kernels import minimise_duration
 from pentapod.timing.jerk.options import JerkOptions
@@ -115,27 +116,27 @@ class Subproblem:
         the last pass's values, so that every window has a solution. gains (N,): decrease of the duration by the pass
         before at each gridpoint, less what is worth another one; a window that gained nothing is left as it is.
         """
-        n, size, reach = len(y), self.options.solver.window, self.options.solver.seam_overlap
+        n, size = len(y), self.options.solver.window
+        reach = min(self.options.solver.seam_overlap, size // 2)  # no two seams have a window in common
         if n < 2 * size:
-            return self.solved(y, x_k, number, 0, n, (0, 0))
+            return self.solved(y, x_k, number, [(0, n)], (0, 0))[0]
         y = y.copy()
         seams = list(range(size if number % 2 == 0 else size // 2, n - size // 2, size))
         if number == 0:
-            for seam in seams:
-                found = self.solved(y, x_k, 0, max(seam - reach, 0), min(seam + reach, n), (0, 0))
+            about = [(max(seam - reach, 0), min(seam + reach, n)) for seam in seams]
+            for seam, (low, _), found in zip(seams, about, self.solved(y, x_k, 0, about, (0, 0)), strict=True):
                 if found is None:
-                    return self.solved(y, x_k, 0, 0, n, (0, 0))
-                y[seam - 1 : seam + 2] = found[seam - 1 : seam + 2]
+                    return self.solved(y, x_k, 0, [(0, n)], (0, 0))[0]
+                y[seam - 1 : seam + 2] = found[seam - 1 - low : seam + 2 - low]
+        windows = [(max(left - 1, 0), min(right + 2, n)) for left, right in pairwise([0, *seams, n])]
+        if gains is not None:
+            windows = [window for window in windows if gains[self.gridpoints(*window)].sum() > 0.0]
         better = y.copy()
-        for left, right in pairwise([0, *seams, n]):
-            low, high = max(left - 1, 0), min(right + 2, n)
-            if gains is not None and gains[self.gridpoints(low, high)].sum() <= 0.0:
-                continue
-            found = self.solved(y, x_k, number, low, high, (3, 3))
+        for (low, high), found in zip(windows, self.solved(y, x_k, number, windows, (3, 3)), strict=True):
             if found is None and number == 0:
-                return self.solved(y, x_k, 0, 0, n, (0, 0))
+                return self.solved(y, x_k, 0, [(0, n)], (0, 0))[0]
             if found is not None:
-                better[low:high] = found[low:high]
+                better[low:high] = found
         return better
 
     def gridpoints(self, low: int, high: int) -> slice:
@@ -143,24 +144,31 @@ class Subproblem:
         return slice(int(np.searchsorted(self.first, low)), int(np.searchsorted(self.first, high - 4, "right")))
 
     def solved(
-        self, y: Floats, x_k: Floats, number: int, low: int, high: int, inside: tuple[int, int]
-    ) -> Floats | None:
-        """Return y with the coefficients from low to before high optimised; None where no start level converges.
+        self, y: Floats, x_k: Floats, number: int, windows: list[tuple[int, int]], inside: tuple[int, int]
+    ) -> list[Floats | None]:
+        """Return the optimised coefficients of windows, from low to before high, None where no start level converges.
 
-        inside: how many coefficients stay at an end of this window that is no end of the interval.
+        windows: with no gridpoints in common; they are solved on all cores. inside: how many coefficients stay at an
+        end of a window that is no end of the interval.
         """
         options = self.options.solver
         levels = options.cold_levels if number == 0 else options.warm_levels
-        fixed = self.fixed[0] if low == 0 else inside[0], self.fixed[1] if high == len(y) else inside[1]
-        known = self.multipliers[self.gridpoints(low, high), -1, 0]
         starts = ((options.known_level, True), *((level, False) for level in levels))
-        answers = (self._solved(y, x_k, *start, low, high, fixed) for start in starts[0 if known.all() else 1 :])
-        return next((answer for answer in answers if answer is not None), None)
+
+        def optimised(window: tuple[int, int]) -> Floats | None:
+            low, high = window
+            fixed = self.fixed[0] if low == 0 else inside[0], self.fixed[1] if high == len(y) else inside[1]
+            known = self.multipliers[self.gridpoints(low, high), -1, 0]
+            answers = (self._solved(y, x_k, *start, low, high, fixed) for start in starts[0 if known.all() else 1 :])
+            return next((answer for answer in answers if answer is not None), None)
+
+        _ = self.binding  # made once, not by each thread
+        return on_all_cores(optimised, windows)
 
     def _solved(
         self, y: Floats, x_k: Floats, level: float, known: bool, low: int, high: int, ends: tuple[int, int]
     ) -> Floats | None:
-        """Return y with the coefficients from low to before high optimised, from slacks and multipliers on a level.
+        """Return the coefficients from low to before high optimised, from slacks and multipliers on a level.
 
         known: whether multipliers of the last solve count where they are above it.
         """
@@ -195,9 +203,7 @@ class Subproblem:
         if not (residual < options.accepted_residual and (converged or gap < options.accepted_gap)):
             return None
         self.multipliers[here] = multipliers
-        y = y.copy() if high - low < len(y) else part
-        y[low:high] = part
-        return y
+        return part
 
     def nodes(self, y: Floats) -> SpeedNodes:
         """Return the law at rests, at gridpoints and halfway between, so that cubics follow the spline closely.

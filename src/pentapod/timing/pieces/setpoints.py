@@ -11,7 +11,7 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints, row_maxima
 from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
-from pentapod.numerics.threads import in_threads
+from pentapod.numerics.threads import in_threads, on_all_cores
 from pentapod.timing.limits.limit import Group
 from pentapod.timing.path.setpoints import InterpolatedSetpoints, SetpointRows, spline_padding
 from pentapod.timing.pieces.piece import PieceProfile
@@ -146,8 +146,8 @@ def unaffected(pieces: Sequence[Setpoints], shares: list[LimitShares], changed: 
 
 def _measured(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, k: int, machine: Machine) -> LimitShares:
     """Return the shares of piece k; the pieces begin at rows `begins` and at stations `lengths`."""
-    parts: list[LimitShares] = []
-    for block in blocks(begins[k + 1] - begins[k], ROWS_AT_ONCE):
+
+    def shares_of(block: slice) -> LimitShares:
         low, high = begins[k] + block.start, begins[k] + block.stop
         first, last = max(low - EDGE, 0), min(high + EDGE, begins[-1])
         rows = _rows(pieces, begins, lengths, first, last)
@@ -159,8 +159,9 @@ def _measured(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, k
             behind = pieces[-1].spline_padding(start=False)[1:]
             rows = SetpointRows.concatenated([rows, behind.shifted(lengths[-2])])
         shares = pieces[k].shares(rows.shifted(-lengths[k]), machine, first_row, high - low)
-        parts.append(shares if high == begins[k + 1] else shares.at(np.arange(high - low)))
-    return LimitShares.joined(parts)
+        return shares if high == begins[k + 1] else shares.at(np.arange(high - low))
+
+    return LimitShares.joined(on_all_cores(shares_of, list(blocks(begins[k + 1] - begins[k], ROWS_AT_ONCE))))
 
 
 def _rows(pieces: Sequence[Setpoints], begins: list[int], lengths: Floats, first: int, last: int) -> SetpointRows:
