@@ -229,14 +229,16 @@ def test_a_plan_for_advice_that_may_leave_more_goes_on_from_the_run(dome, tmp_pa
         write_csv(short, file)
         return short
 
+    def judged(_, specification, **__):
+        of_more = specification.job_digest == more.digest and specification.cutting.coverage.share == 0.0125
+        return Verdict((Certificate("all", of_more, 0.0, 0.1, "", Place(), ""),))
+
     def advised(*search, **_):
         ended.append(search[4](more, silent))
         return SimpleNamespace(advice=(), sentence="nothing was found")
 
     monkeypatch.setattr(task.Task, "program", program)
-    monkeypatch.setattr(
-        attempt, "judged", lambda *_, **__: Verdict((Certificate("all", True, 0.0, 0.1, "", Place(), ""),))
-    )
+    monkeypatch.setattr(attempt, "judged", judged)
     monkeypatch.setattr(stages, "advised", advised)
     assert run(job, tmp_path / "out").refusal.stage == "placement"
     assert not (tmp_path / "out" / "program.csv").exists()

@@ -144,19 +144,17 @@ class Attempt:
         file = self.staging / WITHHELD
         return file.read_bytes() if file.is_file() else None
 
-    def leaving(self, job: Job, **changes: Any) -> Self:
-        """Return the attempt at the same job where another share of the region may be left. changes: of the task."""
+    def tried_with(self, share: float, outcome: Outcome) -> Tried:
+        """Return how the job ends where a share of the region may be left: a plan writes the program that is withheld.
+
+        outcome: of the job, whose program fails in this alone.
+        """
         specification = self.task.specification
         cutting = specification.cutting
         if cutting is not None and cutting.coverage is not None:
-            coverage = dataclasses.replace(cutting.coverage, share=job.tolerance.left_share)
-            cutting = dataclasses.replace(cutting, coverage=coverage)
-        changes |= {"job": job, "specification": dataclasses.replace(specification, cutting=cutting)}
-        return dataclasses.replace(self, task=dataclasses.replace(self.task, **changes))
-
-    def judged_again(self, outcome: Outcome) -> Tried:
-        """Return how the job ends: a plan writes the program that was withheld. outcome: of the run that wrote it."""
-        verdict = judged(self.staging / WITHHELD, self.task.specification, claims=self.task.claims)
+            cutting = dataclasses.replace(cutting, coverage=dataclasses.replace(cutting.coverage, share=share))
+        specification = dataclasses.replace(specification, cutting=cutting)
+        verdict = judged(self.staging / WITHHELD, specification, claims=self.task.claims)
         failed = frozenset(failures(verdict))
         return Tried(None, outcome.margin) if verdict.passed else Tried(STAGE, failed=failed)
 

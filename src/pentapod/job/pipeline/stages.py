@@ -88,14 +88,18 @@ def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried],
         if job.with_(tolerance={"left_share": task.job.tolerance.left_share}).tables != task.job.tables:
             return again(job, progress)
         if frozenset(failed) == LEFT_ALONE:
-            return attempt.leaving(job).judged_again(outcome)
+            return attempt.tried_with(job.tolerance.left_share, outcome)
         if refusal.stage != "placement":
             return again(job, progress)
         # The plan does what this run did, and goes on from there.
-        runner = StageRunner(ending_when_interrupted(progress))
+        runner, own_machine = StageRunner(ending_when_interrupted(progress)), task.specification.sources.machine is None
         runner.stages = [stage for stage in outcome.stages if not isinstance(stage.value, FailedWay | FailedMend)]
+        specification = job_specification(
+            job, task.machine, attempt.mesh, lambda: task.toolpath, own_machine=own_machine
+        )
+        plan = attempt.with_task(job=job, specification=specification, runner=runner)
         with tempfile.TemporaryDirectory() as folder:
-            plan = dataclasses.replace(attempt.leaving(job, runner=runner), staging=Path(folder))
+            plan = dataclasses.replace(plan, staging=Path(folder), unplaced=attempt.unplaced)
             return tried_of(first_that_passes(plan, outcome))
 
     search = (task.job, task.machine, attempt.mesh, task.toolpath, tried, options, runner.progress)
