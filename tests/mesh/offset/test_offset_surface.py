@@ -122,6 +122,19 @@ def test_no_facet_leads_across_a_channel_about_as_wide_as_a_cell(end, turn_deg):
     assert all(number % 2 == 0 for number in facets_at_edges(triangles))
 
 
+def test_the_tip_of_a_pit_over_a_hole_narrower_than_the_ball_is_not_cut_off():
+    """The ball touches the hole's edge all round; the tip is somewhere in a cell of the grid, whose walls are steep."""
+    radius, far = 0.94 * R, 0.02
+    hole = trimesh.creation.annulus(radius, 4.0 * radius, 0.01, sections=96)
+    tip = 0.005 + np.sqrt(R**2 - radius**2)
+    for k in range(12):  # each moves the grid
+        low = -far - np.random.default_rng(k).uniform(0.0, 0.25 * R, 3)
+        part = joined((hole.vertices, hole.faces), box(low, (-far + 1e-3,) * 3))
+        vertices, _ = offset(part, parts=8)
+        inside = (np.hypot(*vertices[:, :2].T) < 0.5 * radius) & (vertices[:, 2] > 0.0)
+        assert vertices[inside, 2].min() == pytest.approx(tip, abs=0.03 * R)
+
+
 def test_the_grid_stays_as_it_is_where_no_channel_is_narrow():
     for shape in (trimesh.creation.torus(0.012, 0.004), trimesh.creation.box([0.01] * 3)):
         part = Mesh.of(shape.vertices, shape.faces)

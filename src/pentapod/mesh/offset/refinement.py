@@ -6,7 +6,8 @@ node inside, away from its closest point, leads to the level and just beyond. If
 all of whose corners are inside, the grid misses it there. Such cells, and those around them, are divided.
 
 A channel about as wide as a cell may be met by some of its edges only: then facets lead across it. Their middles are
-beyond the level, and the cells there are divided as well.
+beyond the level, and the cells there are divided as well. So are those at the tip of a pit, such as over a hole
+narrower than the ball, where facets cut its tip off.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.mesh.normals import corner_angles
 from pentapod.mesh.offset.dual_contouring import Cells, Grid
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.mesh.topology import components
@@ -26,6 +28,9 @@ _BEYOND = 0.01
 """How far beyond the level a place is looked at, as a share of the distance: half of the least play that is found."""
 _ACROSS = 0.05
 """How far beyond the level the middle of a facet is that leads across a channel, as a share of the distance."""
+_PIT, _OFF_TIP = 0.5, 0.01
+"""Angle, radians, that facets about a vertex lack of a full turn at the tip of a pit; how far beyond the level the
+middle of one is that cuts it off, as a share of the distance. Elsewhere the angle is less than 0.1."""
 _LINK = 1.0
 """How near, in distances, a missed place is to the surface or another such place: mirrored sheets are two away."""
 _CORNERS = np.indices((2, 2, 2)).reshape(3, -1).T
@@ -94,7 +99,11 @@ def missed_cells(tree: FacetTree, nodes: Nodes, surface: Floats, facets: Ints, l
     """
     grid = nodes.cells.grid
     middles = surface[facets].mean(axis=1)
-    across = middles[~tree.within(middles, level * (1.0 + _ACROSS))]
+    at_tips = _at_tips(surface, facets)
+    across = np.concatenate([
+        middles[~tree.within(middles, level * (1.0 + _ACROSS))],
+        middles[at_tips][~tree.within(middles[at_tips], level * (1.0 + _OFF_TIP))],
+    ])  # fmt: skip
     cells = np.concatenate([
         _between_nodes(tree, nodes, surface, level), np.floor((across - grid.low) / grid.step).astype(np.intp)
     ])  # fmt: skip
@@ -104,6 +113,19 @@ def missed_cells(tree: FacetTree, nodes: Nodes, surface: Floats, facets: Ints, l
     half = 0.5 * math.sqrt(3.0) * grid.step
     gap = tree.closest(grid.low + (around + 0.5) * grid.step, level + 1.01 * half)[0]
     return around[np.abs(gap - level) <= 1.001 * half]
+
+
+def _at_tips(surface: Floats, facets: Ints) -> Ints:
+    """Return the facets (n,) at the tips of pits of a surface; none at its borders."""
+    around = np.bincount(facets.ravel(), corner_angles(surface, facets).ravel(), len(surface))
+    tips = (around > 0.0) & (around < 2.0 * np.pi - _PIT)
+    near = np.flatnonzero(tips[facets].any(axis=1))
+    sides = np.stack([facets[near], np.roll(facets[near], -1, axis=1)], axis=-1).reshape(-1, 2)
+    # Each side has its other facet, unless it is at a border.
+    keys, other = sides @ [len(surface), 1], sides[:, ::-1] @ [len(surface), 1]
+    alone = ~np.isin(keys, other) & tips[sides].any(axis=1)
+    tips[sides[alone].ravel()] = False
+    return near[tips[facets[near]].any(axis=1)]
 
 
 def _between_nodes(tree: FacetTree, nodes: Nodes, surface: Floats, level: float) -> Ints:
