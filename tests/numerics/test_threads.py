@@ -1,4 +1,4 @@
-"""in_threads: results in the order of the items, few at a time, and errors where they belong."""
+"""Work on all cores: results in the order of the items, errors where they belong, the same on any number of cores."""
 
 import os
 import threading
