@@ -118,16 +118,14 @@ def plan(
             progress("tool axis", 0.0, f"smallest margin {best.smallest:.3f}")
             smooth = SOLVERS[solver](problem, False).smooth(best, min(keep, best.smallest), progress)
             leans = leans if smooth is None else AxisSpline.of(problem.samples, problem.cone).leans(smooth)
-        return _path(toolpath, everywhere, best, everywhere.samples.spread(leans, rows), found.choice)
+        placed = _path(toolpath, everywhere, best, everywhere.samples.spread(leans, rows), found.choice)
+        # A waypoint that does not shape the path may all the same be out of limits.
+        again = len(rows) < len(toolpath) and not placed.keeps(NEEDED_MARGIN)
+        return planned(np.arange(len(toolpath))) if again else placed
 
     if start is not None and (again := _as_planned(toolpath, _beside(whole, start), start, progress)) is not None:
         return again
-    rows = samples.shaping(toolpath.starts)
-    placed = planned(rows)
-    # One that does not shape the path may all the same be out of limits.
-    if len(rows) < len(toolpath) and isinstance(placed, PlacedPath) and not placed.keeps(NEEDED_MARGIN):
-        placed = planned(np.arange(len(toolpath)))
-    return placed
+    return planned(samples.shaping(toolpath.starts))
 
 
 @on_one_thread

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -17,6 +18,7 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning import PlacedPath, PlacementConstraints, plan
 from pentapod.planning.limits.limit import LimitKind
+from pentapod.planning.placement import own_leans
 from pentapod.planning.placement.own_leans import OwnLeans
 from pentapod.planning.placement.placed_path import UnplacedPath
 from pentapod.planning.problem.problem import PlacementProblem
@@ -103,6 +105,25 @@ def test_the_same_path_without_a_pass_keeps_placement_and_leans(desk, here):
     assert np.abs(other.placement.transform.matrix - whole.placement.transform.matrix).max() > 1e-6
 
 
+def test_leans_that_keep_a_part_of_the_margin_are_not_searched_for_again(desk, here, monkeypatch):
+    """They were found for all waypoints: another search does not know more."""
+    searches: list[int] = []
+
+    def counted(problem, *rest):
+        searches.append(len(problem.samples.tilt_centres))
+        return searched(problem, *rest)
+
+    planner = importlib.import_module("pentapod.planning.plan")
+    searched = planner._searched
+    monkeypatch.setattr(planner, "_searched", counted)
+    monkeypatch.setattr(own_leans, "ENOUGH", 0.6 * NEEDED_MARGIN)
+    monkeypatch.setattr(ToolpathSamples, "shaping", lambda samples, _: np.arange(0, len(samples.tilt_centres), 3))
+    placed = plan(zigzag(), desk, **options(desk, here, 0.03))
+    assert isinstance(placed, PlacedPath), str(placed)
+    assert 0.59 * NEEDED_MARGIN < placed.smallest_margin < NEEDED_MARGIN
+    assert searches == [120]
+
+
 def test_no_field_fits_there_but_every_waypoint_by_itself(desk, here):
     samples = ToolpathSamples.of(zigzag(), TILT)
     asked = options(desk, here, 0.03)
@@ -147,9 +168,10 @@ def test_a_part_of_the_margin_is_enough_where_no_spline_comes_up_to_it(keep, at_
 def test_where_the_smoothest_leans_are_not_found_the_first_that_fit_count(swaying, monkeypatch):
     """They are rougher, but keep the margin at all waypoints."""
     problem, start, leans = swaying
-    smooth, search = smoothed(problem, start, 0.1, leans=leans), _Smoothing.smoothest
+    once = replace(SMOOTHING, levels=1)
+    smooth, search = smoothed(problem, start, 0.1, once, leans=leans), _Smoothing.smoothest
     monkeypatch.setattr(_Smoothing, "smoothest", lambda run, *, first=False: search(run, first=True) if first else None)
-    found = smoothed(problem, start, 0.1, leans=leans)
+    found = smoothed(problem, start, 0.1, once, leans=leans)
     spline = AxisSpline.of(problem.samples, problem.cone)
     assert smallest(problem, start, found) >= 0.1 - SMOOTHING.slack
     assert spline.cost_of(found) > 1.5 * spline.cost_of(smooth)

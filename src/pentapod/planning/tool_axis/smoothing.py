@@ -30,11 +30,12 @@ class SmoothingOptions:
     that, to first order, stay this much above it within the trust region. decrease: relative decrease of the cost below
     which the iteration stops. shortfall, saving: a step whose margin is short by less than `shortfall` is accepted if
     it saves the share `saving` of the cost; the next step restores the margin. largest_radius, least_radius: of the
-    trust region, as shares of the cone. good: ratio of actual to predicted decrease from which it is doubled; shrink:
-    its factor after a rejected step. rough, fine, finer: accuracies of the first program and of the last, and the
-    accuracy in between as a share of the relative decrease of the step before. levels: steps in which given leans come
-    up to the margin to keep; enough: share of it that is enough where they come up no farther; far: all waypoints
-    within this distance of it are active then. cost: of the penalty on excess.
+    trust region, as shares of the cone; next_radius: the least with which it begins for another margin to keep. good:
+    ratio of actual to predicted decrease from which it is doubled; shrink: its factor after a rejected step. rough,
+    fine, finer: accuracies of the first program and of the last, and the accuracy in between as a share of the relative
+    decrease of the step before. levels: steps in which given leans come up to the margin to keep; enough: share of it
+    that is enough where they come up no farther; far: all waypoints within this distance of it are active then. cost:
+    of the penalty on excess.
     """
 
     steps: int = 40
@@ -47,6 +48,7 @@ class SmoothingOptions:
     saving: float = 0.1
     largest_radius: float = 2.0
     least_radius: float = 1e-3
+    next_radius: float = 0.5
     good: float = 0.25
     shrink: float = 0.4
     rough: float = 1e-3
@@ -197,7 +199,8 @@ class _Smoothing:
 
     def aim(self, keep: float) -> None:
         """Keep another margin from now on."""
-        self.keep, self.radius = keep, self.options.largest_radius
+        self.keep = keep
+        self.radius = min(max(2.0 * self.radius, self.options.next_radius), self.options.largest_radius)
         self.short = keep - float(self.margins.min())
         self.violated = self.margins < keep
 
