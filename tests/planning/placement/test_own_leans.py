@@ -165,6 +165,22 @@ def test_a_part_of_the_margin_is_enough_where_no_spline_comes_up_to_it(keep, at_
         assert kept <= keep + 1e-3
 
 
+def test_leans_come_up_farther_where_the_next_margin_begins_with_a_step_like_the_last(desk, here):
+    """With the widest trust region for each margin the search ended at 0.279, with the last one alone as well."""
+    asked = options(desk, here, 0.02)
+    problem = PlacementProblem.of(
+        ToolpathSamples.of(zigzag(), TILT), desk, asked["constraints"], limits=asked["limits"]
+    )
+    start = problem.candidate(problem.margins[0], here, problem.upright)
+    leans = OwnLeans.of(problem, start).mixed
+    reached = [
+        smallest(problem, start, smoothed(problem, start, 0.5, replace(SMOOTHING, next_radius=radius), leans=leans))
+        for radius in (SMOOTHING.largest_radius, 0.0, SMOOTHING.next_radius)
+    ]
+    assert max(reached[:2]) < 0.3
+    assert reached[2] > 0.35
+
+
 def test_where_the_smoothest_leans_are_not_found_the_first_that_fit_count(swaying, monkeypatch):
     """They are rougher, but keep the margin at all waypoints."""
     problem, start, leans = swaying
