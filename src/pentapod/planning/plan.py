@@ -119,9 +119,10 @@ def plan(
             smooth = SOLVERS[solver](problem, False).smooth(best, min(keep, best.smallest), progress)
             leans = leans if smooth is None else AxisSpline.of(problem.samples, problem.cone).leans(smooth)
         placed = _path(toolpath, everywhere, best, everywhere.samples.spread(leans, rows), found.choice)
-        # A waypoint that does not shape the path may all the same be out of limits.
-        again = len(rows) < len(toolpath) and not placed.keeps(NEEDED_MARGIN)
-        return planned(np.arange(len(toolpath))) if again else placed
+        if len(rows) < len(toolpath) and not placed.keeps(NEEDED_MARGIN):
+            # A waypoint that does not shape the path may all the same be out of limits.
+            return planned(np.arange(len(toolpath)))
+        return placed
 
     if start is not None and (again := _as_planned(toolpath, _beside(whole, start), start, progress)) is not None:
         return again
