@@ -130,6 +130,27 @@ def test_the_corner_at_a_border_gets_a_line_where_the_last_pass_leaves_too_much(
     assert np.ptp(found.points[:, 0]) > 0.018
 
 
+def test_the_corner_between_two_walls_gets_a_line_however_small_the_facets_in_it_are():
+    """Passes along both walls end 1 mm before it: too much is left only where the ball touches three sides at once."""
+
+    def walls(patch):
+        side = np.flatnonzero(patch.topology.facets_at_edge[patch.topology.edge_of_side.ravel()] == 1)
+        along_y, along_x = ((patch.vertices[patch.side_ends(side)][:, :, k] < 1e-9).all(axis=1) for k in (0, 1))
+        normals = np.where(along_x[:, None], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0])
+        return side[along_x | along_y], normals[along_x | along_y]
+
+    uneven = np.linspace(0.0, 1.0, 121) ** 2
+    patch = sheet(flat, cells=(0.02 * uneven, 0.03 * uneven))
+    way = np.linspace(1e-3, 0.02, 80)
+    first = Passes.of([(np.outer(way, axis), np.tile([0.0, 0.0, 1.0], (80, 1))) for axis in np.eye(3)[:2]])
+    passes = Passes.joined([first, along_x(np.append(np.arange(STEP, 0.03, STEP), 0.0295), flat)])
+    assert len(rest_lines(patch, passes, R, STEP, none, closed)) == 0
+    found = rest_lines(patch, passes, R, STEP, none, walls)
+    assert len(found) == 1
+    assert np.linalg.norm(found.points, axis=1).min() < 0.1e-3
+    assert np.linalg.norm(found.points, axis=1).max() < STEP
+
+
 def test_the_bottom_of_a_hollow_gets_a_line_where_passes_beside_it_leave_too_much():
     """Passes on both flanks, a stepover apart along the surface of centres; the ball's own bottom lies between them."""
     apart = 0.5 * (STEP - 0.5 * np.pi * 1e-3) / np.sqrt(2.0) + 1e-3 / np.sqrt(2.0)

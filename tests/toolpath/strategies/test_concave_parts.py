@@ -29,14 +29,14 @@ def regions_visited(job, mesh, toolpath) -> int:
     return len(np.unique(region[KDTree(patch.vertices).query(middles)[1]]))
 
 
-def measured(name, strategy, parts=None) -> tuple[Left, int]:
+def measured(name, strategy, parts=None, stepover=STEPOVER, angle=None) -> tuple[Left, int]:
     """What a job such as `pentapod new` writes leaves on a part, and how many separate regions it machines."""
     mesh = concave_parts.mesh(name, parts)
     reachable = Reachable(mesh, R, 2e-4)
     tables = {
-        "part": {"mesh": "dome.stl", "unit": "mm"},
+        "part": {"mesh": "dome.stl", "unit": "mm"} | ({} if angle is None else {"region_angle_deg": angle}),
         "tool": {"type": "ball", "diameter_mm": 2e3 * R},
-        "toolpath": {"strategy": strategy, "stepover_mm": 1e3 * STEPOVER},
+        "toolpath": {"strategy": strategy, "stepover_mm": 1e3 * stepover},
         "axis": {"mode": "auto"},
         "feed": {"cut_mm_min": 1500},
     }
@@ -45,7 +45,7 @@ def measured(name, strategy, parts=None) -> tuple[Left, int]:
     regions = reachable.regions(np.radians(90.0))
     if parts is not None:  # of generated parts the drop cutter sees all regions
         regions = max(regions, regions_visited(job, mesh, toolpath))
-    return left(reachable.samples(4000), toolpath, STEPOVER), regions
+    return left(reachable.samples(4000, 80.0 if angle is None else angle), toolpath, stepover), regions
 
 
 def holds(found: Left, regions: int, strategy: str):
@@ -59,6 +59,19 @@ def holds(found: Left, regions: int, strategy: str):
 @pytest.mark.parametrize("name", ["stairs", pytest.param("crossing_slots", marks=pytest.mark.slow)])
 def test_raster_leaves_what_the_ball_forbids(name):
     holds(*measured(name, "raster"), "raster")
+
+
+@pytest.mark.parametrize("name", [
+    "stairs", *(pytest.param(name, marks=pytest.mark.slow) for name in concave_parts.GENERATED if name != "stairs"),
+])  # fmt: skip
+@pytest.mark.parametrize(
+    "angle", [25.0, pytest.param(40.0, marks=pytest.mark.slow), pytest.param(60.0, marks=pytest.mark.slow)]
+)
+def test_places_of_a_region_that_the_ball_touches_only_from_beside_it_are_machined(name, angle):
+    """Floors of narrow pockets, corners and ends of grooves: the ball lies on what is steeper than the region."""
+    found, _ = measured(name, "raster", stepover=2e-3, angle=angle)
+    assert found.over <= CHORDAL + 2e-5  # of the measure itself
+    assert found.gouge <= CHORDAL + 1e-6
 
 
 @pytest.mark.slow

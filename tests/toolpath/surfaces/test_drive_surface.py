@@ -229,6 +229,53 @@ def test_a_region_that_ends_at_the_foot_of_walls_ends_in_a_corner_there(pocket):
         assert wide.feet(wide.patch(Region(angle=np.radians(angle)))).any() == some
 
 
+def pocketed(*corners):
+    """A block 10 mm high with an upright, convex pocket, 6 mm deep, of these corners in millimetres, anticlockwise."""
+    corners = np.array(corners, dtype=float)
+    along = np.roll(corners, -1, axis=0) - corners
+    out = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
+    far = corners + 10.0 * (out + np.roll(out, 1, axis=0))
+    rims = [np.concatenate([np.roll(q, -k, axis=0)[:2] for q in (corners, far)]) for k in range(len(corners))]
+    columns = [(rim, 4.0, 10.0) for rim in rims] + [(far, 0.0, 4.0)]
+    solids = [
+        trimesh.convex.convex_hull(np.array([[x, y, z] for x, y in base for z in (low, high)]))
+        for base, low, high in columns
+    ]
+    return part(trimesh.util.concatenate(solids).apply_scale(1e-3))
+
+
+def test_over_a_pocket_narrower_than_the_ball_it_goes_along_the_middle_as_low_as_its_rims_allow():
+    """The rims, 4 mm apart, are steeper than the region; between them lies a floor of it."""
+    options = RasterOptions(stepover=2e-3, region=Region(angle=np.radians(30.0)))
+    toolpath = make_toolpath(pocketed((0, 8), (30, 8), (30, 12), (0, 12)), BallCutter(R), options)
+    lines = [s.tips + R * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT]
+    points = dense([line for line in lines if line[:, 2].min() < 12.4e-3])
+    inside = (points[:, 0] > 4e-3) & (points[:, 0] < 26e-3)
+    lowest = 10e-3 + np.sqrt(R**2 - 2e-3**2)
+    np.testing.assert_allclose(points[inside, 1:], np.tile([10e-3, lowest], (inside.sum(), 1)), atol=2e-5)
+    covered, _ = np.histogram(points[inside, 0], bins=11, range=(4e-3, 26e-3))
+    assert covered.all()
+
+
+def test_a_valley_without_a_floor_of_the_region_is_left_alone():
+    """The bottom of a groove between two flanks of 45° is no place of a region of 30°."""
+    groove = Mesh.of(*grid(lambda x, y: np.minimum(np.abs(x), 6e-3), 20e-3, 20))
+    surface = DriveSurface.of(groove, R, UP)
+    assert not len(surface.valleys(Region(angle=np.radians(30.0))).faces)
+
+
+def test_passes_reach_into_the_tips_of_a_floor_whose_walls_are_not_machined():
+    """A triangle with sides of 30 mm: its floor's tips are 6 mm from its corners, where the ball touches both walls."""
+    corners = np.array([(0.0, 0.0), (30.0, 0.0), (15.0, 15.0 * np.sqrt(3.0))])
+    options = RasterOptions(stepover=2e-3, region=Region(angle=np.radians(30.0)))
+    toolpath = make_toolpath(pocketed(*corners), BallCutter(R), options)
+    middle, size = corners.mean(axis=0), 10.0 * np.sqrt(3.0)
+    tips = middle + (1.0 - 6.0 / size) * (corners - middle)
+    cuts = dense([s.tips + R * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT], 20)
+    away = np.linalg.norm(cuts[None] - 1e-3 * np.array([*tips.T, np.full(3, 7.0)]).T[:, None], axis=2).min(axis=1)
+    assert (away < 1e-4).all()
+
+
 @pytest.mark.parametrize("degrees", [50.0, 80.0])
 def test_no_more_than_a_ridge_is_left_at_the_foot_of_walls_that_are_not_machined(pocket, degrees):
     """On the floor up to its walls, beyond what the ball forbids: its limit and its swept balls are known."""

@@ -18,7 +18,7 @@ from scipy.spatial import KDTree
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.runs import members
-from pentapod.mesh.normals import corner_angles
+from pentapod.mesh.normals import corner_angles, unit_or_zero
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.topology import components
@@ -89,7 +89,7 @@ def rest_lines(
     for _ in range(options.rounds):
         left = _left(near, ends, KDTree(centres), radius, height, options)
         left[left > 0.0] *= ~hides(near.vertices[near.faces[left > 0.0]].mean(axis=1))
-        lines = _lines(near, left, radius, options.negligible * whole, options.shortest * stepover, options)
+        lines = _lines(near, ends, left, radius, options.negligible * whole, options.shortest * stepover, options)
         if not len(lines):
             break
         parts.append(lines)
@@ -187,21 +187,38 @@ def _about(patch: Patch, wanted: Bools, reach: float) -> Bools:
     return np.asarray(KDTree(middles[wanted]).query(middles, distance_upper_bound=reach)[0]) < np.inf
 
 
-def _spread(patch: Patch, radius: float) -> Floats:
+def _spread(patch: Patch, rising: Rising, radius: float) -> Floats:
     """Return the area (V,) of the ball that touches the part from each vertex, as far as its facets leave it open.
 
     At the bottom of a pit, such as over a hole narrower than the ball, that is much, though the pit has hardly any
-    area. By the theorem of Gauss and Bonnet the normals about a vertex span what its angles lack of a full turn.
+    area. By the theorem of Gauss and Bonnet the normals about a vertex span what its angles lack of a full turn. Where
+    the patch ends between two walls, they span a triangle with those of the walls.
     """
     topology, faces = patch.topology, patch.faces
     around = np.bincount(faces.ravel(), corner_angles(patch.vertices, faces).ravel(), len(patch.vertices))
     lacks = np.maximum(2.0 * np.pi - around, 0.0)
     lacks[topology.edges[topology.facets_at_edge != 2]] = 0.0
+    sides, beyond = rising
+    corners = patch.side_ends(sides)
+    inner, walls = np.zeros_like(patch.vertices), np.zeros((2, *patch.vertices.shape))
+    for end in (0, 1):
+        inner[corners[:, end]] += patch.facet_normals[sides // 3]
+        walls[end, corners[:, end]] = beyond
+    ends = np.flatnonzero(walls.any(axis=2).all(axis=0))
+    a, b, c = unit_or_zero(inner[ends]), *walls[:, ends]
+    cosines = sum(np.einsum("ni,ni->n", *pair) for pair in ((a, b), (b, c), (c, a)))
+    lacks[ends] = 2.0 * np.abs(np.arctan2(np.einsum("ni,ni->n", a, np.cross(b, c)), 1.0 + cosines))
     return radius**2 * lacks
 
 
 def _lines(
-    patch: Patch, left: Floats, radius: float, negligible: float, shortest: float, options: RestOptions
+    patch: Patch,
+    rising: Rising,
+    left: Floats,
+    radius: float,
+    negligible: float,
+    shortest: float,
+    options: RestOptions,
 ) -> Passes:
     """Return a line through each connected piece of the facets on which something is left (F,)."""
     rest = left > 0.0
@@ -214,7 +231,7 @@ def _lines(
     owner = piece[patch.faces[:, 0]]
     area = np.bincount(owner[rest], weights=patch.areas[rest], minlength=int(piece.max()) + 1)
     at = np.unique(patch.faces[rest])
-    area += np.bincount(piece[at], weights=_spread(patch, radius)[at], minlength=len(area))
+    area += np.bincount(piece[at], weights=_spread(patch, rising, radius)[at], minlength=len(area))
     order = np.argsort(area, kind="stable")
     needed = order[np.cumsum(area[order]) > negligible]
     height = np.zeros(len(patch.vertices))

@@ -121,13 +121,19 @@ def with_fills(surface: Surface, paths: ContactPaths, options: PathOptions) -> C
     if not (isinstance(surface, RolledSurface) and isinstance(options, CoverOptions) and options.fill):
         return paths
     patch = surface.patch(options.region)
-    creases = uncrossed(crease_lines(patch, also=surface.feet(patch)), paths.passes, paths.stepover, surface.radius)
-    passes = Passes.joined([paths.passes, creases])
+    patches, creases = [patch], [crease_lines(patch, also=surface.feet(patch))]
+    valleys = surface.valleys(options.region) if isinstance(surface, DriveSurface) else None
+    if valleys is not None:
+        patches.append(valleys)
+        creases.append(crease_lines(valleys))
+    lines = uncrossed(Passes.joined(creases), paths.passes, paths.stepover, surface.radius)
+    passes = Passes.joined([paths.passes, lines])
     hides = partial(surface.hides, slack=options.chordal)
-    rest = Passes.of([])
     if isinstance(surface, DriveSurface):
-        rest = rest_lines(patch, passes, surface.radius, paths.stepover, hides, surface.rising, options.shortest)
-    return replace(paths, passes=Passes.joined([passes, rest])) if len(creases) + len(rest) else paths
+        for left in patches:
+            rest = rest_lines(left, passes, surface.radius, paths.stepover, hides, surface.rising, options.shortest)
+            passes = Passes.joined([passes, rest])
+    return replace(paths, passes=passes) if len(passes) > len(paths.passes) else paths
 
 
 def make_toolpath(mesh: Mesh, tool: Tool, options: PathOptions, axis: Floats | None = None) -> Toolpath:

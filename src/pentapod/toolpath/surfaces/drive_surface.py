@@ -9,6 +9,7 @@ part. A ball is clear at a centre whatever its axis, so nothing of this depends 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -28,6 +29,7 @@ from pentapod.toolpath.surfaces.ball_centres import BallCentres, smoothed
 from pentapod.toolpath.surfaces.options import DriveOptions
 from pentapod.toolpath.surfaces.rolled_surface import RolledSurface
 from pentapod.toolpath.surfaces.tight_channels import has_tight_channels
+from pentapod.toolpath.surfaces.valleys import valleys
 
 _KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, float, int, bytes], tuple[FacetTree, Mesh, bool]]] = (
     WeakKeyDictionary()
@@ -147,6 +149,14 @@ class DriveSurface(RolledSurface):
         away = _distance(patch.vertices[beyond <= 0.0], above, about)
         missed = above[(away > self.radius) & (away < np.inf)]
         return (beyond > 0.0) & (_distance(missed, patch.vertices, about) < np.inf)
+
+    def valleys(self, region: Region) -> Patch | None:
+        """Return facets where the ball comes nearest to what it does not touch of a region; None with walls in it."""
+        own = Patch.of(self.part, region)
+        if region.angle is None or region.angle >= 0.5 * np.pi or not len(own.faces):
+            return None
+        hides, covers = partial(self.hides, slack=0.0), partial(self.part_field.hides, slack=1e-3 * self.radius)
+        return valleys(self.mesh, self.patch(region), own, self.radius, hides, covers, self.options.valleys)
 
     def feet(self, patch: Patch) -> Bools:
         """Return which edges (E,) of a patch are its borders along a corner: without a pass much is left under it."""

@@ -55,6 +55,21 @@ class ChannelOptions(Value):
 
 
 @dataclass(frozen=True)
+class ValleyOptions(Value):
+    """How places are found where the ball comes nearest to what it does not touch of a region.
+
+    apart: distance of points of the region, a share; most: number of them. nearer: by how much the ball must come
+    nearer to one than on the region, a share. fragment: width of a piece of the drive surface, a share, up to which it
+    holds no pass.
+    """
+
+    apart: float = 0.1
+    most: int = 200_000
+    nearer: float = 0.03
+    fragment: float = 0.5
+
+
+@dataclass(frozen=True)
 class DriveOptions(Value):
     """How the surface is made, and where it and a region of it end.
 
@@ -69,7 +84,8 @@ class DriveOptions(Value):
     halvings: of an edge, to find where the region ends on it. wall: cosine to a region's direction below which a facet
     is one of a wall; foot: cosine by which the foot of one is within the region; leaning: cosine by which one may lean
     over a floor. steep: angle to the axis, radians, from which a face has a foot; rising: least rise of a facet over
-    it, as a share of its height. overhangs: what hides a point. channels: in which it would be closed. places: how they
+    it, as a share of its height. overhangs: what hides a point. channels: in which it would be closed. valleys:
+    beside a region. places: how they
     are moved onto the surface.
     """
 
@@ -93,4 +109,5 @@ class DriveOptions(Value):
     rising: float = 0.5
     overhangs: OverhangOptions = field(default_factory=OverhangOptions)
     channels: ChannelOptions = field(default_factory=ChannelOptions)
+    valleys: ValleyOptions = field(default_factory=ValleyOptions)
     places: PlaceOptions = field(default_factory=PlaceOptions)
