@@ -257,6 +257,21 @@ def test_over_a_pocket_narrower_than_the_ball_it_goes_along_the_middle_as_low_as
     assert covered.all()
 
 
+@pytest.mark.parametrize(("width", "degrees", "turn"), [(4.9, 40.0, 0.0), (4.9, 54.0, 0.3), (4.0, 30.0, 0.7)])
+def test_a_pass_leads_along_the_middle_of_narrow_pockets_however_they_lie_in_the_grid(width, degrees, turn):
+    """In the middle the ball touches both rims at 55 deg, 55 deg and 42 deg: within a third of a stepover."""
+    along, across = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+    middle = np.array([0.13, 0.07])
+    ways = [(-12.0, -0.5), (12.0, -0.5), (12.0, 0.5), (-12.0, 0.5)]
+    mesh = pocketed(*(middle + a * along + b * width * across for a, b in ways))
+    options = RasterOptions(stepover=3e-3, region=Region(angle=np.radians(degrees)))
+    toolpath = make_toolpath(mesh, BallCutter(R), options)
+    cuts = dense([s.tips + R * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT], 10)
+    height = 10e-3 + np.sqrt(R**2 - (0.5e-3 * width) ** 2)
+    line = np.array([[*1e-3 * (middle + a * along), height] for a in np.linspace(-8.0, 8.0, 50)])
+    assert KDTree(cuts).query(line)[0].max() < 1e-3
+
+
 def test_a_valley_without_a_floor_of_the_region_is_left_alone():
     """The bottom of a groove between two flanks of 45° is no place of a region of 30°."""
     groove = Mesh.of(*grid(lambda x, y: np.minimum(np.abs(x), 6e-3), 20e-3, 20))

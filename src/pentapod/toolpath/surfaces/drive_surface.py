@@ -174,7 +174,7 @@ class DriveSurface(RolledSurface):
         side = np.flatnonzero(topology.facets_at_edge[topology.edge_of_side.ravel()] == 1)
         ends = patch.vertices[patch.side_ends(side)]
         out = unit_or_zero(np.cross(ends[:, 1] - ends[:, 0], patch.facet_normals[side // 3]))
-        step, middles = self.options.border * self.radius * out, ends.mean(axis=1)
+        step, middles = self.options.across * self.radius * out, ends.mean(axis=1)
         within, beyond = self._normals(middles - step), self._normals(middles + step)
         bent = np.einsum("ni,ni->n", within, beyond) < np.cos(self.options.crease)
         higher = np.einsum("ni,ni->n", beyond - within, out) < 0.0

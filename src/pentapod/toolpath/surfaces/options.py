@@ -75,7 +75,8 @@ class DriveOptions(Value):
 
     step: of the grid, a share. parts: how many times finer it is in channels between its nodes; narrower ones may be
     closed. border: how exactly an open border is known, a share; enters: how far beyond it the ball gets where it is no
-    hole. rolls: how far beyond it the ball goes about hollows, within `about_hollows`, that it cuts only so: points at
+    hole. across: how far from an edge, a share, normals on both sides are compared: edges in a corner are not exactly
+    in it. rolls: how far beyond it the ball goes about hollows, within `about_hollows`, that it cuts only so: points at
     a height `hollow` above the part tell. around: longest link around what is in the way, as a multiple of the straight
     way and twice the clearance. evened: how often the stepover for a scallop is averaged with that of neighbouring
     facets, whose curvature is noisy. about: how far beyond what the ball touches in a region's box the surface is made,
@@ -84,14 +85,14 @@ class DriveOptions(Value):
     halvings: of an edge, to find where the region ends on it. wall: cosine to a region's direction below which a facet
     is one of a wall; foot: cosine by which the foot of one is within the region; leaning: cosine by which one may lean
     over a floor. steep: angle to the axis, radians, from which a face has a foot; rising: least rise of a facet over
-    it, as a share of its height. overhangs: what hides a point. channels: in which it would be closed. valleys:
-    beside a region. places: how they
-    are moved onto the surface.
+    it, as a share of its height. overhangs: what hides a point. channels: in which it would be closed. valleys: beside
+    a region. places: how they are moved onto the surface.
     """
 
     step: float = 0.25
     parts: int = 8
     border: float = 0.02
+    across: float = 0.05
     enters: float = 0.5
     rolls: float = 0.3
     hollow: float = 0.05
