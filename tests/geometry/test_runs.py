@@ -1,10 +1,11 @@
 """Runs, against plain loops."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pentapod.geometry.runs import equal_runs, marked_runs, members, run_starts
+from pentapod.geometry.runs import distinct, equal_runs, marked_runs, members, run_starts
 
 
 def plain_runs(values: list[int]) -> list[list[int]]:
@@ -43,3 +44,9 @@ def test_members(counts: list[int]) -> None:
     run, number = members(np.array(counts, dtype=np.intp))
     pairs = [(r, n) for r, count in enumerate(counts) for n in range(count)]
     assert list(zip(run.tolist(), number.tolist(), strict=True)) == pairs
+
+
+@pytest.mark.parametrize("numbers", [[], [3], [2, 2, 2], [[5, -1], [5, 4]]])
+def test_distinct_integers_are_those_of_a_set_in_order(numbers):
+    found = distinct(np.array(numbers, dtype=np.intp))
+    assert found.tolist() == sorted(set(np.ravel(np.array(numbers, dtype=np.intp)).tolist()))

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats, Ints, row_lengths, row_maxima
+from pentapod.geometry.runs import distinct
 from pentapod.mesh.normals import CHUNK, facet_cross
 from pentapod.mesh.topology import Topology
 
@@ -46,7 +47,7 @@ def joined_borders(vertices: Floats, topology: Topology) -> tuple[Ints, float] |
     open_ = topology.facets_at_edge == 1
     if not open_.any():
         return None
-    border = np.unique(topology.edges[open_])
+    border = distinct(topology.edges[open_])
     near = NEAR * float(np.ptp(vertices, axis=0).max())
     pairs = border[np.sort(KDTree(vertices[border]).query_pairs(near, output_type="ndarray"), axis=1)]
     if not len(pairs):

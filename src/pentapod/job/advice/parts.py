@@ -13,6 +13,7 @@ from pentapod.base.errors import InputError
 from pentapod.base.units import from_si
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
+from pentapod.geometry.runs import distinct
 from pentapod.job.advice.axes import Changes
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.sketch import Sketch
@@ -67,7 +68,7 @@ class Regions:
     def _extents(self) -> Floats:
         """Lowest and highest coordinates (2, 3) of the region, metres."""
         patch = Patch.of(self.mesh, job_region(self.job))
-        points = patch.vertices[np.unique(patch.faces)]
+        points = patch.vertices[distinct(patch.faces)]
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
     @cached_property

@@ -7,6 +7,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.units import from_si
 from pentapod.cutters.tool import Tool
+from pentapod.geometry.runs import distinct
 from pentapod.job.build.region import covers_region, job_region
 from pentapod.job.build.tool import job_tool
 from pentapod.job.schema.job import Job
@@ -39,7 +40,7 @@ def check_reach(job: Job, machine: Machine, mesh: Mesh) -> None:
         _check_unit(job, machine, mesh)
         return
     region = Patch.of(mesh, job_region(job))
-    points = region.vertices[np.unique(region.faces)]
+    points = region.vertices[distinct(region.faces)]
     if len(points) and _far_apart(points, apart, job.placement.setups + 1) <= job.placement.setups:
         return
     extents = np.ptp(mesh.bounds, axis=0)

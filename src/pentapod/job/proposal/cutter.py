@@ -10,6 +10,7 @@ import numpy as np
 from pentapod.base.arrays import Floats
 from pentapod.base.units import from_si, to_si
 from pentapod.geometry.directions import tangent_frame
+from pentapod.geometry.runs import distinct
 from pentapod.job.proposal.options import OPTIONS
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
@@ -62,7 +63,7 @@ def cutter_for(mesh: Mesh, patch: Patch, direction: Floats, *, stands: bool) -> 
 
 def _usual(patch: Patch, direction: Floats) -> float:
     """Return the usual diameter of a ball for a region, mm."""
-    points = patch.vertices[np.unique(patch.faces)] @ np.stack([*tangent_frame(direction), direction]).T
+    points = patch.vertices[distinct(patch.faces)] @ np.stack([*tangent_frame(direction), direction]).T
     across, along, high = from_si(np.ptp(points, axis=0), "mm")
     least, most = min(across, along), max(across, along, high)
     largest = min(OPTIONS.cutter * most, OPTIONS.narrow * least)

@@ -13,6 +13,7 @@ from pentapod.base.errors import MeshError
 from pentapod.base.units import from_si, to_si
 from pentapod.base.values import Value
 from pentapod.geometry.directions import tangent_frame
+from pentapod.geometry.runs import distinct
 from pentapod.job.proposal.cutter import cutter_for, rounded
 from pentapod.job.proposal.options import OPTIONS
 from pentapod.machine.machine import Machine
@@ -215,7 +216,7 @@ def _toolpath(patch: Patch, direction: Floats) -> dict[str, Any]:
     flat = float(patch.areas[upright > np.cos(WaterlineOptions.shallowest)].sum())
     if steep > OPTIONS.steep * whole and flat < OPTIONS.flat * whole:
         return {"strategy": "waterline"}
-    width, height = np.ptp(patch.vertices[np.unique(patch.faces)] @ np.stack(tangent_frame(direction)).T, axis=0)
+    width, height = np.ptp(patch.vertices[distinct(patch.faces)] @ np.stack(tangent_frame(direction)).T, axis=0)
     return {"strategy": "raster", "direction_deg": 0.0 if width >= height else 90.0}
 
 
@@ -227,7 +228,7 @@ def _walls(patch: Patch, direction: Floats) -> float:
 
 def _placement(mesh: Mesh, patch: Patch, direction: Floats, work: WorkVolume) -> dict[str, Any]:
     """Return the placement on a table at the height that brings the region to the middle of the work volume."""
-    heights = patch.vertices[np.unique(patch.faces)] @ direction
+    heights = patch.vertices[distinct(patch.faces)] @ direction
     above = 0.5 * float(heights.min() + heights.max()) - float((mesh.vertices @ direction).min())
     towards_base = -1.0 if work.centre[2] > 0.0 else 1.0
     table = {"mode": "table", "table_z_mm": rounded(from_si(work.centre[2] - towards_base * above, "mm"))}

@@ -16,6 +16,7 @@ import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import MeshError
+from pentapod.geometry.runs import distinct
 from pentapod.mesh.io.registry import MeshData, MeshFormat, ReadOptions
 from pentapod.mesh.io.text import EXPORT_AGAIN, NUMBER, check_last_line, line_of, triangle_fans
 
@@ -147,7 +148,7 @@ def _check_announced(path: Path, text: bytes, vertices: int, faces: int) -> None
 
 def _unused(path: Path, text: bytes, vertices: Floats, faces: Ints, *, loose: bool) -> tuple[str, ...]:
     """Return a note on vertices of no facet. Raises MeshError where many are and the file has no lines or points."""
-    count, unused = len(vertices), len(vertices) - len(np.unique(faces))
+    count, unused = len(vertices), len(vertices) - len(distinct(faces))
     what = (
         f"{unused:,} of {count:,} vertices belong to no facet: was the file cut off? "
         "an OBJ does not tell how many facets it should have"

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats, Ints
+from pentapod.geometry.runs import distinct
 from pentapod.mesh.normals import corner_angles
 from pentapod.mesh.offset.dual_contouring import Cells, Grid
 from pentapod.mesh.query.tree import FacetTree
@@ -164,10 +165,10 @@ def divided(tree: FacetTree, nodes: Nodes, cells: Ints, parts: int, level: float
     grid = Grid(old.low, old.step / parts, parts * (old.shape - 1) + 1)
     coarse = grid.keys(parts * old.nodes(nodes.keys))
     within = np.indices((parts + 1,) * 3).reshape(3, -1).T
-    fine = np.unique((grid.keys(parts * cells)[:, None] + grid.keys(within)).ravel())
-    keys = np.union1d(coarse, fine)
-    outside = np.zeros(len(keys), dtype=np.bool_)
-    whole, made = np.isin(keys, coarse, assume_unique=True), np.isin(keys, fine, assume_unique=True)
+    fine = distinct(grid.keys(parts * cells)[:, None] + grid.keys(within))
+    keys = distinct(np.concatenate([coarse, fine]))
+    outside, whole, made = np.zeros((3, len(keys)), dtype=np.bool_)
+    whole[np.searchsorted(keys, coarse)] = made[np.searchsorted(keys, fine)] = True
     outside[whole] = nodes.outside
     outside[~whole] = ~tree.within(grid.points(keys[~whole]), level)
     return Nodes(Cells(grid, parts, np.sort(grid.keys(parts * cells))), keys, outside, whole, made)

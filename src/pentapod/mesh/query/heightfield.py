@@ -11,6 +11,7 @@ from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import normalised, tangent_frame
 from pentapod.geometry.runs import members
 from pentapod.mesh.mesh import Mesh
+from pentapod.numerics.threads import for_rows
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,10 @@ class HeightField:
         normals[there] = (weight * self.mesh.corner_normals[facets[there]]).sum(axis=1)
         return surface, normals, heights
 
+    def heights(self, points: Floats) -> Floats:
+        """Return the heights (N,) of `topmost` alone."""
+        return self._topmost(points, 1e-9)[0]
+
     def hides(self, points: Floats, slack: float) -> Bools:
         """Return whether the mesh lies above points (N, 3), along the view, by more than `slack` metres.
 
@@ -90,7 +95,7 @@ class HeightField:
         """
         sideways = OPTIONS.sideways * (0.83 * self._frame[0] + 0.56 * self._frame[1])
         height = points @ self.view + slack
-        sides = (self._topmost(points + side, 1e-9)[0] for side in (sideways, -sideways))
+        sides = (self.heights(points + side) for side in (sideways, -sideways))
         return np.logical_and(*(above > height for above in sides))
 
     def front_area(self) -> float:
@@ -107,8 +112,8 @@ class HeightField:
 
         local, count = points @ self._frame.T, len(points)
         heights, facets, weights = np.empty(count), np.empty(count, dtype=np.intp), np.empty((count, 3))
-        grid = (*self._facets_near(local[:, :2]), self._grid[3])
-        topmost_facets(local, self._local, self.mesh.faces, self._doubled, grid, margin, heights, facets, weights)
+        given = self._grid[3], self._local, self.mesh.faces, self._doubled, margin
+        for_rows(topmost_facets, (local, *self._facets_near(local[:, :2])), given, (heights, facets, weights))
         return heights, facets, weights
 
     def _facets_near(self, points: Floats) -> tuple[Ints, Ints]:

@@ -17,7 +17,7 @@ from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.directions import normalised
-from pentapod.geometry.runs import members
+from pentapod.geometry.runs import distinct, members
 from pentapod.mesh.normals import corner_angles, unit_or_zero
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
@@ -230,7 +230,7 @@ def _lines(
     piece = components(len(patch.vertices), *sides.T)[1]
     owner = piece[patch.faces[:, 0]]
     area = np.bincount(owner[rest], weights=patch.areas[rest], minlength=int(piece.max()) + 1)
-    at = np.unique(patch.faces[rest])
+    at = distinct(patch.faces[rest])
     area += np.bincount(piece[at], weights=_spread(patch, rising, radius)[at], minlength=len(area))
     order = np.argsort(area, kind="stable")
     needed = order[np.cumsum(area[order]) > negligible]

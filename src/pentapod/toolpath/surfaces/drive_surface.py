@@ -109,7 +109,7 @@ class DriveSurface(RolledSurface):
             x, y = (step * self.radius * side for side in tangent_frame(self.view))
             around = (0.83 * x + 0.56 * y, 0.56 * x - 0.83 * y)
             for aside in (*around, *(-one for one in around)):
-                hidden[hidden] = self.field.topmost(points[hidden] + aside)[2] > height[hidden]
+                hidden[hidden] = self.field.heights(points[hidden] + aside) > height[hidden]
         if self.lowered:  # in narrow bores the mesh is too coarse to tell
             rows, top = np.flatnonzero(hidden), float((self.mesh.vertices @ self.view).max(initial=-np.inf))
             out = points[rows] + np.maximum(top - points[rows] @ self.view, 0.0)[:, None] * self.view
@@ -155,8 +155,13 @@ class DriveSurface(RolledSurface):
         own = Patch.of(self.part, region)
         if region.angle is None or region.angle >= 0.5 * np.pi or not len(own.faces):
             return None
-        hides, covers = partial(self.hides, slack=0.0), partial(self.part_field.hides, slack=1e-3 * self.radius)
-        return valleys(self.mesh, self.patch(region), own, self.radius, hides, covers, self.options.valleys)
+        covers = partial(self.part_field.hides, slack=1e-3 * self.radius)
+        return valleys(self.mesh, self.patch(region), own, self.radius, self._machined, covers, self.options.valleys)
+
+    def _machined(self) -> Bools:
+        """Return at which vertices (V,) of the drive surface the ball may be: neither hidden nor beyond a border."""
+        seen = ~self.hides(self.mesh.vertices, 0.0)
+        return seen if self.part.topology.watertight else seen & (self._beyond_border(Patch.whole(self.mesh)) <= 0.0)
 
     def feet(self, patch: Patch) -> Bools:
         """Return which edges (E,) of a patch are its borders along a corner: without a pass much is left under it."""

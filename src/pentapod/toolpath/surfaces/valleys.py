@@ -23,14 +23,14 @@ def valleys(
     patch: Patch,
     own: Patch,
     radius: float,
-    hides: Callable[[Floats], Bools],
+    machined: Callable[[], Bools],
     covers: Callable[[Floats], Bools],
     options: ValleyOptions,
 ) -> Patch:
     """Return the facets of a ball's drive surface about its places nearest to what it does not touch of a region.
 
     patch: of the drive surface, from which the ball touches the region; own: the region on the part. radius: of the
-    ball, metres. hides: tells which points (N, 3) of the drive surface cannot be machined; covers: over which points
+    ball, metres. machined: tells at which vertices (V,) of the drive surface the ball may be; covers: over which points
     (N, 3) of the part the part itself lies.
     """
     wanted = np.zeros(len(mesh.vertices), dtype=np.bool_)
@@ -44,9 +44,9 @@ def valleys(
     missed = np.flatnonzero(away > radius + least)
     missed = missed[~covers(points[missed])]
     if len(missed):
-        seen = np.flatnonzero(~hides(mesh.vertices))
-        near, which = (np.asarray(found) for found in KDTree(mesh.vertices[seen]).query(points[missed]))
-        wanted[seen[which[near < away[missed] - least]]] = True
+        places = np.flatnonzero(machined())
+        near, which = (np.asarray(found) for found in KDTree(mesh.vertices[places]).query(points[missed]))
+        wanted[places[which[near < away[missed] - least]]] = True
     return Patch.whole(mesh).only(np.asarray(wanted[mesh.faces].any(axis=1)))
 
 

@@ -11,10 +11,12 @@ from pentapod.numerics.kernels import kernel
 @kernel
 def topmost_facets(
     points: Floats,
+    begins: Ints,
+    counts: Ints,
+    facets: Ints,
     vertices: Floats,
     faces: Ints,
     doubled: Floats,
-    grid: tuple[Ints, Ints, Ints],
     margin: float,
     heights: Floats,
     found: Ints,
@@ -22,10 +24,9 @@ def topmost_facets(
 ) -> None:
     """Fill heights (N,), facets (N,) and barycentric weights (N, 3) over points (N, 2); −inf and −1 where none is.
 
-    vertices (V, 3), doubled (F,): twice the facets' areas in the plane, with sign. grid: where the facets near each
-    point begin (N,) and how many they are (N,) in the third. Of facets at one height the first counts.
+    begins, counts (N,): where the facets near each point begin in `facets`, and how many they are. vertices (V, 3),
+    doubled (F,): twice the facets' areas in the plane, with sign. Of facets at one height the first counts.
     """
-    begins, counts, facets = grid
     for q in range(len(points)):
         x, y = points[q, 0], points[q, 1]
         heights[q], found[q] = -math.inf, -1
