@@ -93,6 +93,15 @@ def sunk(options):
     return float(getattr(options, "depth", 0.0))
 
 
+def divided(segment, step):
+    """Which waypoints (N,) divide a turn of the axis: on the chord between their neighbours."""
+    turns, within = angle_between(segment.axes[1:], segment.axes[:-1]), np.zeros(len(segment.tips), dtype=bool)
+    along, offset = segment.tips[2:] - segment.tips[:-2], segment.tips[1:-1] - segment.tips[:-2]
+    beside = np.linalg.norm(np.cross(along, offset), axis=1) <= 1e-9 * np.linalg.norm(along, axis=1)
+    within[1:-1] = beside & (np.minimum(turns[1:], turns[:-1]) > 0.5 * step)
+    return within
+
+
 def check_laws(mesh, tool, options, toolpath):
     """What holds for every strategy; returns the cuts."""
     cuts = [s for s in toolpath.segments if s.kind is SegmentKind.CUT]
@@ -106,7 +115,10 @@ def check_laws(mesh, tool, options, toolpath):
     size = float(np.ptp(mesh.bounds, axis=0).max())
     noise = 1e-6 * max(size / 0.1, 1.0)  # a micrometre on parts of up to a hand's breadth
     off = surfaces.surface_distance(mesh, contacts)
-    assert off.max() <= sunk(options) + noise
+    # Where the normal jumps within the shortest distance of waypoints, those that divide its turn are on a chord.
+    inserted = np.concatenate([divided(s, options.axis_step) for s in cuts])
+    assert off[~inserted].max() <= sunk(options) + noise
+    assert off.max() <= sunk(options) + options.chordal + noise
     assert surfaces.surface_distance(mesh, middles).max() <= sunk(options) + options.chordal + noise
     if sunk(options) and not isinstance(options, ImageOptions):
         # As deep as asked along the axis, but for creases, where it swings; beside walls the surface is nearer aside.

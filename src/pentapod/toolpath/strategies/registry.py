@@ -16,6 +16,7 @@ from pentapod.cutters.bull_nose import BullNose
 from pentapod.cutters.tool import Tool
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.passes import Passes
+from pentapod.toolpath.axis.steps import stepped
 from pentapod.toolpath.lines.rest_lines import rest_lines
 from pentapod.toolpath.lines.sharp_edges import crease_lines, uncrossed
 from pentapod.toolpath.linking.assembly import assembled
@@ -88,7 +89,11 @@ def toolpath_with_report(
     progress("toolpath", 0.5, "passes")
     paths = with_fills(surface, strategy.paths(surface, options), options)
     progress("toolpath", 0.9, "waypoints and links")
-    return assembled(strategy.name, surface, tool, options, paths)
+    toolpath, report = assembled(strategy.name, surface, tool, options, paths)
+    if isinstance(surface, RolledSurface):  # its centres keep their distance exactly, whatever its axis
+        return toolpath, report
+    # Where the normal jumps within `closest` metres, a pass has no room for the waypoints in between.
+    return stepped(toolpath, options.axis_step), report
 
 
 def rolls_over(tool: Tool, options: PathOptions) -> bool:
