@@ -21,6 +21,7 @@ from pentapod.toolpath.surfaces.part_surface import PartSurface
 from slotted_parts import slotted
 from toolpath_surfaces import grid
 
+SLOTS = [(0.0, 0.0), (0.05, 0.0), (0.05, 0.5), (0.3, 0.0), (0.3, 0.5)]
 R, CHORDAL, UP = 3e-3, 5e-6, np.array([0.0, 0.0, 1.0])
 
 
@@ -309,8 +310,10 @@ def test_no_more_than_a_ridge_is_left_at_the_foot_of_walls_that_are_not_machined
     assert missed.mean() < 1e-3
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.5])
-@pytest.mark.parametrize("play", [0.0, 0.05, 0.3])
+@pytest.mark.parametrize(
+    ("play", "turn"),
+    [(0.0, 0.5), *(pytest.param(*each, marks=pytest.mark.slow) for each in SLOTS)],
+)
 def test_a_slot_hardly_wider_than_the_ball_is_machined_at_its_bottom(play, turn):
     """A slot as wide as the cutter is what most drawings ask for."""
     mesh = part(slotted(6.0 + play, turn))
