@@ -166,12 +166,7 @@ class Mesh(Value):
 
     def small_bodies(self, least: float) -> Bools:
         """Return the facets (F,) of bodies with an extent, the diagonal of their bounding box, below `least` metres."""
-        count, body = self.topology.bodies
-        low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-        corners, owner = self.vertices[self.faces].reshape(-1, 3), np.repeat(body, 3)
-        np.minimum.at(low, owner, corners)
-        np.maximum.at(high, owner, corners)
-        return np.asarray((np.linalg.norm(high - low, axis=1) < least)[body])
+        return self.topology.small_bodies(self.vertices, least)
 
     def without_small_bodies(self, least: float) -> Mesh:
         """Return the mesh without the bodies whose extent is below `least` metres, such as the debris of a scan.

@@ -88,6 +88,18 @@ class Topology:
         later = np.flatnonzero(same)
         return components(len(self.faces), order[later] // 3, order[later - 1] // 3)
 
+    def small_bodies(self, points: Floats, least: float) -> Bools:
+        """Return the facets (F,) of bodies with an extent, the diagonal of their bounding box, below `least`.
+
+        points (V, 3): the vertices.
+        """
+        count, body = self.bodies
+        low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+        corners, owner = points[self.faces].reshape(-1, 3), np.repeat(body, 3)
+        np.minimum.at(low, owner, corners)
+        np.maximum.at(high, owner, corners)
+        return np.asarray((np.linalg.norm(high - low, axis=1) < least)[body])
+
     @property
     def watertight(self) -> bool:
         """Whether every edge belongs to exactly two facets."""

@@ -273,11 +273,18 @@ def test_a_pass_leads_along_the_middle_of_narrow_pockets_however_they_lie_in_the
     assert KDTree(cuts).query(line)[0].max() < 1e-3
 
 
+def test_beyond_the_border_of_a_sheet_the_ball_does_not_come_nearer():
+    """At the ends of a ridge's feet, where it could roll over the border."""
+    ridge = Mesh.of(*grid(lambda x, y: np.clip(0.05 - 3.7 * np.abs(y), 0.0, 0.02) + 0.0 * x, 0.04, 74))
+    surface = DriveSurface.of(ridge, R, UP)
+    assert not len(surface.nearest_to_unreached(Region(angle=np.radians(89.0))).faces)
+
+
 def test_a_valley_without_a_floor_of_the_region_is_left_alone():
     """The bottom of a groove between two flanks of 45° is no place of a region of 30°."""
     groove = Mesh.of(*grid(lambda x, y: np.minimum(np.abs(x), 6e-3), 20e-3, 20))
     surface = DriveSurface.of(groove, R, UP)
-    assert not len(surface.valleys(Region(angle=np.radians(30.0))).faces)
+    assert not len(surface.nearest_to_unreached(Region(angle=np.radians(30.0))).faces)
 
 
 def test_passes_reach_into_the_tips_of_a_floor_whose_walls_are_not_machined():

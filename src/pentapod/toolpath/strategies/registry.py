@@ -73,7 +73,8 @@ def toolpath_with_report(
     """Return the toolpath of the strategy that takes these options, and its report.
 
     axis (3,): unit, of a tool that does not turn: then a bull-nose or flat end rolls over the part as a ball does. None
-    for axes along the surface's normals.
+    for axes along the surface's normals. Where a cutter rolls over the part they may turn by more than `axis_step` from
+    one waypoint to the next: `stepped` divides such turns.
 
     Raises ToolpathError if nothing is left to machine, if the options do not suit part or tool, or if a length is much
     larger than the part, as one in millimetres would be.
@@ -127,10 +128,10 @@ def with_fills(surface: Surface, paths: ContactPaths, options: PathOptions) -> C
         return paths
     patch = surface.patch(options.region)
     patches, creases = [patch], [crease_lines(patch, also=surface.feet(patch))]
-    valleys = surface.valleys(options.region) if isinstance(surface, DriveSurface) else None
-    if valleys is not None:
-        patches.append(valleys)
-        creases.append(crease_lines(valleys))
+    beside = surface.nearest_to_unreached(options.region) if isinstance(surface, DriveSurface) else None
+    if beside is not None:
+        patches.append(beside)
+        creases.append(crease_lines(beside))
     lines = uncrossed(Passes.joined(creases), paths.passes, paths.stepover, surface.radius)
     passes = Passes.joined([paths.passes, lines])
     hides = partial(surface.hides, slack=options.chordal)

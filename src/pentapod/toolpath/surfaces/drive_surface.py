@@ -29,7 +29,7 @@ from pentapod.toolpath.surfaces.ball_centres import BallCentres, smoothed
 from pentapod.toolpath.surfaces.options import DriveOptions
 from pentapod.toolpath.surfaces.rolled_surface import RolledSurface
 from pentapod.toolpath.surfaces.tight_channels import has_tight_channels
-from pentapod.toolpath.surfaces.valleys import valleys
+from pentapod.toolpath.surfaces.unreached import nearest_to_unreached
 
 _KNOWN: WeakKeyDictionary[Mesh, dict[tuple[float, float, int, bytes], tuple[FacetTree, Mesh, bool]]] = (
     WeakKeyDictionary()
@@ -150,13 +150,17 @@ class DriveSurface(RolledSurface):
         missed = above[(away > self.radius) & (away < np.inf)]
         return (beyond > 0.0) & (_distance(missed, patch.vertices, about) < np.inf)
 
-    def valleys(self, region: Region) -> Patch | None:
-        """Return facets where the ball comes nearest to what it does not touch of a region; None with walls in it."""
+    def nearest_to_unreached(self, region: Region) -> Patch | None:
+        """Return the facets from which the ball comes nearest to places of a region that it cannot touch.
+
+        None for a region that takes upright walls, too: then the ball touches what is of the region there.
+        """
         own = Patch.of(self.part, region)
         if region.angle is None or region.angle >= 0.5 * np.pi or not len(own.faces):
             return None
         covers = partial(self.part_field.hides, slack=1e-3 * self.radius)
-        return valleys(self.mesh, self.patch(region), own, self.radius, self._machined, covers, self.options.valleys)
+        given = self.patch(region), own, self.radius, self._machined, covers, self.options.unreached
+        return nearest_to_unreached(self.mesh, *given)
 
     def _machined(self) -> Bools:
         """Return at which vertices (V,) of the drive surface the ball may be: neither hidden nor beyond a border."""

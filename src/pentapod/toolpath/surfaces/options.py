@@ -55,12 +55,12 @@ class ChannelOptions(Value):
 
 
 @dataclass(frozen=True)
-class ValleyOptions(Value):
-    """How places are found where the ball comes nearest to what it does not touch of a region.
+class UnreachedOptions(Value):
+    """How places of a region are found that the ball cannot touch.
 
-    apart: distance of points of the region, a share; most: number of them. nearer: by how much the ball must come
-    nearer to one than on the region, a share. fragment: width of a piece of the drive surface, a share, up to which it
-    holds no pass.
+    apart: distance between the points of the region that are looked at, a share; most: how many there are at most.
+    nearer: a place beside the region counts if the ball is nearer to a point there by this share. fragment: a piece of
+    the drive surface that is no wider than this share holds no pass.
     """
 
     apart: float = 0.1
@@ -85,8 +85,8 @@ class DriveOptions(Value):
     halvings: of an edge, to find where the region ends on it. wall: cosine to a region's direction below which a facet
     is one of a wall; foot: cosine by which the foot of one is within the region; leaning: cosine by which one may lean
     over a floor. steep: angle to the axis, radians, from which a face has a foot; rising: least rise of a facet over
-    it, as a share of its height. overhangs: what hides a point. channels: in which it would be closed. valleys: beside
-    a region. places: how they are moved onto the surface.
+    it, as a share of its height. overhangs: what hides a point. channels: in which it would be closed. unreached:
+    places of a region. places: how they are moved onto the surface.
     """
 
     step: float = 0.25
@@ -110,5 +110,5 @@ class DriveOptions(Value):
     rising: float = 0.5
     overhangs: OverhangOptions = field(default_factory=OverhangOptions)
     channels: ChannelOptions = field(default_factory=ChannelOptions)
-    valleys: ValleyOptions = field(default_factory=ValleyOptions)
+    unreached: UnreachedOptions = field(default_factory=UnreachedOptions)
     places: PlaceOptions = field(default_factory=PlaceOptions)
