@@ -245,9 +245,14 @@ def pocketed(*corners):
     return part(trimesh.util.concatenate(solids).apply_scale(1e-3))
 
 
-def test_over_a_pocket_narrower_than_the_ball_it_goes_along_the_middle_as_low_as_its_rims_allow():
-    """The rims, 4 mm apart, are steeper than the region; between them lies a floor of it."""
-    options = RasterOptions(stepover=2e-3, region=Region(angle=np.radians(30.0)))
+FLOOR = Region(angle=np.radians(30.0))
+BOX = Region(box=np.array([(-5e-3, 8.5e-3, 0.0), (35e-3, 11e-3, 20e-3)]))
+
+
+@pytest.mark.parametrize("region", [FLOOR, BOX], ids=["angle", "box"])
+def test_over_a_pocket_narrower_than_the_ball_it_goes_along_the_middle_as_low_as_its_rims_allow(region):
+    """The rims, 4 mm apart, are steeper than the region, or beyond its box; between them lies a floor of it."""
+    options = RasterOptions(stepover=2e-3, region=region)
     toolpath = make_toolpath(pocketed((0, 8), (30, 8), (30, 12), (0, 12)), BallCutter(R), options)
     lines = [s.tips + R * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT]
     points = dense([line for line in lines if line[:, 2].min() < 12.4e-3])

@@ -153,10 +153,11 @@ class DriveSurface(RolledSurface):
     def nearest_to_unreached(self, region: Region) -> Patch | None:
         """Return the facets from which the ball comes nearest to places of a region that it cannot touch.
 
-        None for a region that takes upright walls, too: then the ball touches what is of the region there.
+        None for a region that takes upright walls, too, and has no box: there the ball touches what is of the region.
         """
         own = Patch.of(self.part, region)
-        if region.angle is None or region.angle >= 0.5 * np.pi or not len(own.faces):
+        upright = region.angle is None or region.angle >= 0.5 * np.pi
+        if (upright and region.box is None) or not len(own.faces):
             return None
         covers = partial(self.part_field.hides, slack=1e-3 * self.radius)
         given = self.patch(region), own, self.radius, self._machined, covers, self.options.unreached
