@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import KDTree
 
 import concave_parts
-from left_material import Left, Reachable, left
+from left_material import Left, Reachable, Samples, left
 from pentapod.job import Job
 from pentapod.job.build.region import job_region
 from pentapod.job.build.toolpath import job_toolpath
@@ -29,12 +29,26 @@ def regions_visited(job, mesh, toolpath) -> int:
     return len(np.unique(region[KDTree(patch.vertices).query(middles)[1]]))
 
 
-def measured(name, strategy, parts=None, stepover=STEPOVER, angle=None) -> tuple[Left, int]:
-    """What a job such as `pentapod new` writes leaves on a part, and how many separate regions it machines."""
+def box_across(mesh, first, last):
+    """A box (2, 3) over shares of the part's extents along x and y."""
+    low, high = mesh.bounds
+    sides = np.array([low + first * (high - low), low + last * (high - low)])
+    sides[:, 2] = low[2] - 1e-3, high[2] + 1e-3
+    return sides
+
+
+def measured(name, strategy, parts=None, stepover=STEPOVER, angle=None, box=None) -> tuple[Left, int]:
+    """What a job such as `pentapod new` writes leaves on a part, and how many separate regions it machines.
+
+    box: shares of the part's extents along x and y between which it is machined.
+    """
     mesh = concave_parts.mesh(name, parts)
+    sides = None if box is None else box_across(mesh, *box)
     reachable = Reachable(mesh, R, 2e-4)
     tables = {
-        "part": {"mesh": "dome.stl", "unit": "mm"} | ({} if angle is None else {"region_angle_deg": angle}),
+        "part": {"mesh": "dome.stl", "unit": "mm"}
+        | ({} if angle is None else {"region_angle_deg": angle})
+        | ({} if sides is None else {"region_box_mm": (1e3 * sides).tolist()}),
         "tool": {"type": "ball", "diameter_mm": 2e3 * R},
         "toolpath": {"strategy": strategy, "stepover_mm": 1e3 * stepover},
         "axis": {"mode": "auto"},
@@ -45,7 +59,12 @@ def measured(name, strategy, parts=None, stepover=STEPOVER, angle=None) -> tuple
     regions = reachable.regions(np.radians(90.0))
     if parts is not None:  # of generated parts the drop cutter sees all regions
         regions = max(regions, regions_visited(job, mesh, toolpath))
-    return left(reachable.samples(4000, 80.0 if angle is None else angle), toolpath, stepover), regions
+    samples = reachable.samples(4000 if box is None else 9000, 80.0 if angle is None else angle)
+    if sides is not None:
+        samples = Samples(
+            reachable, samples.points[((samples.points > sides[0]) & (samples.points < sides[1])).all(axis=1)]
+        )
+    return left(samples, toolpath, stepover), regions
 
 
 def holds(found: Left, regions: int, strategy: str):
@@ -70,6 +89,16 @@ def test_raster_leaves_what_the_ball_forbids(name):
 def test_places_of_a_region_that_the_ball_touches_only_from_beside_it_are_machined(name, angle):
     """Floors of narrow pockets, corners and ends of grooves: the ball lies on what is steeper than the region."""
     found, _ = measured(name, "raster", stepover=2e-3, angle=angle)
+    assert found.over <= CHORDAL + 2e-5  # of the measure itself
+    assert found.gouge <= CHORDAL + 1e-6
+
+
+@pytest.mark.parametrize("box", [(0.17, 0.71), pytest.param((0.3, 0.83), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", [
+    "ribs", *(pytest.param(name, marks=pytest.mark.slow) for name in concave_parts.GENERATED if name != "ribs"),
+])  # fmt: skip
+def test_places_in_a_box_that_the_ball_touches_only_from_beyond_it_are_machined(name, box):
+    found, _ = measured(name, "raster", stepover=2e-3, box=box)
     assert found.over <= CHORDAL + 2e-5  # of the measure itself
     assert found.gouge <= CHORDAL + 1e-6
 
