@@ -62,7 +62,7 @@ def test_shipped_job_is_planned_timed_written_and_judged_on_every_robot(changed,
     assert asked.constraints is not None
     assert asked.collision_world is not None
     placed = plan(
-        toolpath, machine, tilt=asked.tilt, constraints=asked.constraints, collision_world=asked.surroundings
+        toolpath, machine, tilt=asked.tilt, constraints=asked.constraints, collision_world=asked.collision_world
     ).unwrap()
     legs = leg_path(placed, machine, path_tolerance=asked.path_tolerance, axis_tolerance=asked.axis_tolerance).unwrap()
     trajectory = retime(legs, machine).unwrap()
