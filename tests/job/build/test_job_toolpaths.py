@@ -181,6 +181,9 @@ def test_mistakes_name_their_key(make_job, change, message):
 def test_a_flat_end_may_not_tilt(make_job):
     with pytest.raises(JobError, match="cannot tilt"):
         Job.load(make_job((BALL, 'type = "flat"\ndiameter_mm = 6'), ("tilt_deg = 0", "tilt_deg = 5")))
+    for mode in ('mode = "normal"', 'mode = "fixed"\ndirection = [0, 0, 1]'):
+        upright = Job.load(make_job((BALL, 'type = "flat"\ndiameter_mm = 6'), ("tilt_deg = 0", mode)))
+        assert upright.axis.tilt_deg == 0.0
 
 
 def test_auto_axes_start_from_normals_and_leave_stem_and_holder_to_the_planner(make_job):

@@ -35,8 +35,8 @@ class AxisKeys:
         Key(
             "deg",
             "largest angle between tool axis and nominal axis (the normal, unless mode says otherwise), at most 60; "
-            'with mode "auto" from the normal, and what suits the cutter when left out: 90 for a ball, 15 for beams '
-            "and sprays, 0 for bull and flat ends",
+            "0 for bull and flat ends, also when left out; "
+            'with mode "auto" from the normal, and when left out 90 for a ball, 15 for beams and sprays',
             ge=0.0,
             le=90.0,
         ),
@@ -75,6 +75,13 @@ class AxisKeys:
             wrong("directions", "as many directions as places are needed", f"{len(table.places_mm)} directions")
 
 
+def by_default(axis: TomlTable, tilt_deg: float) -> TomlTable:
+    """Return the table [axis] with a lean that counts as left out."""
+    changed = axis.model_copy(update={"tilt_deg": tilt_deg})
+    changed.model_fields_set.discard("tilt_deg")
+    return changed
+
+
 AxisTable = table_of(AxisKeys, TomlTable, Orientation)
 
 
@@ -91,9 +98,7 @@ def limited_lean(axis: TomlTable, tool: str, strategy: str) -> TomlTable:
             wrong(f"axis.{key}", 'means nothing for axis mode "auto"', '0, or mode = "normal"')
     most = float(from_si(CUTTERS[tool].largest_lean, "deg"))
     if "tilt_deg" not in axis.model_fields_set:
-        limited = axis.model_copy(update={"tilt_deg": most})
-        limited.model_fields_set.discard("tilt_deg")
-        return limited
+        return by_default(axis, most)
     if axis.tilt_deg > most:
         wrong("axis.tilt_deg", f'more than a tool of type "{tool}" may lean', f"at most {most:g}", value=axis.tilt_deg)
     return axis

@@ -15,7 +15,7 @@ from pydantic import create_model, model_validator
 from pentapod.base.keys import Key
 from pentapod.base.tables import TomlTable, table_of, wrong
 from pentapod.base.units import to_si
-from pentapod.job.schema.axis import AxisTable, limited_lean
+from pentapod.job.schema.axis import AxisTable, by_default, limited_lean
 from pentapod.job.schema.placement import FixtureTable, PlacementTable
 from pentapod.job.schema.process import ProcessTable
 from pentapod.job.schema.strategies import ToolpathTable, strategy_table
@@ -231,6 +231,8 @@ class _JobRules(TomlTable):
     def _leaning(self) -> _JobRules:
         if self.axis.mode == "auto":
             vars(self).update(axis=limited_lean(self.axis, self.tool.type, self.toolpath.strategy))
+        elif self.tool.type in ("bull", "flat") and "tilt_deg" not in self.axis.model_fields_set:
+            vars(self).update(axis=by_default(self.axis, 0.0))
         if self.tool.type in ("bull", "flat") and self.axis.tilt_deg > 0.0:
             wrong("axis.tilt_deg", f'a tool of type "{self.tool.type}" cannot tilt without gouging', "tilt_deg = 0")
         return self
