@@ -10,8 +10,11 @@ STAGE = "verdict"
 """The stage of the refusal of a program."""
 
 
-def withheld(verdict: Verdict) -> Refusal | None:
-    """Return the refusal of a program some claims about which fail; None where all claims that were judged hold."""
+def withheld(verdict: Verdict, *, foreseen: bool = False) -> Refusal | None:
+    """Return the refusal of a program some claims about which fail; None where all claims that were judged hold.
+
+    foreseen: the verdict is one on the toolpath, and there is no program.
+    """
     failed = list(failures(verdict).values())
     if not failed:
         return None
@@ -19,8 +22,9 @@ def withheld(verdict: Verdict) -> Refusal | None:
     more = f"; and {rest} more claim{'s' if rest > 1 else ''}" if rest > 0 else ""
     return Refusal(
         STAGE,
-        f"the program fails its own verdict: {'; '.join(_said(each) for each in failed[:3])}{more}",
-        remedy="report.html shows where",
+        f"the program {'would fail' if foreseen else 'fails'} its own verdict: "
+        f"{'; '.join(_said(each) for each in failed[:3])}{more}",
+        remedy="" if foreseen else "report.html shows where",
     )
 
 

@@ -262,6 +262,9 @@ def test_what_nearer_passes_leave_is_compared_with_the_last_way_that_left_too_mu
         def with_task(self, **_):
             return self
 
+        def foretold(self):
+            return None
+
         def planned(self):
             return next(outcomes)
 
@@ -296,6 +299,9 @@ def test_nearer_passes_begin_at_the_placement_of_the_run_before(way, begins, ref
         def with_task(self, *, start=None, **_):
             return Planned(**{**vars(self), "start": start})
 
+        def foretold(self):
+            return None
+
         def planned(self):
             starts.append(self.start)
             stages.append(len(self.runner.stages))
@@ -318,6 +324,27 @@ def test_nearer_passes_begin_at_the_placement_of_the_run_before(way, begins, ref
     other_attempts._otherwise(attempt, before, way(job), "second attempt")
     assert starts == ([placed] if begins else []) + ([None] if refused or not begins else [])
     assert len(set(stages)) == 1, "what was tried first leaves no stages"
+
+
+@pytest.mark.parametrize("stepover", [6.0, 3.0])
+def test_another_way_whose_toolpath_leaves_too_much_is_not_planned(stepover, job, tmp_path, monkeypatch):
+    """Passes of 6 mm leave more than a ridge of 3 mm, and no program is needed to tell."""
+    planned = []
+    wide = job.with_(toolpath={"stepover_mm": stepover}, tolerance={"left_mm": 0.5})
+
+    def as_asked(self):
+        planned.append(stands(self.task.job))
+        return failing(self.task.job, limits=("tool body touches the part",))
+
+    monkeypatch.setattr(attempt.Attempt, "planned", as_asked)
+    outcome = run(wide, tmp_path / "out", advice=None)
+    assert planned == ([False] if stepover == 6.0 else [False, True])
+    way = outcome.find(FailedWay)
+    assert way.claims == ({SURFACE_LEFT} if stepover == 6.0 else set())
+    if stepover == 6.0:
+        assert way.left > 20.0
+        said = next(stage.remark for stage in outcome.stages if stage.name == ANOTHER_WAY)
+        assert f"the program would fail its own verdict: {SURFACE_LEFT}" in said
 
 
 def test_what_fails_decides_on_the_other_way(job):

@@ -22,6 +22,7 @@ from pentapod.toolpath.linking.partition import Piece
 from pentapod.verify import Coverage, Cutting
 from pentapod.verify.replay.claim import Idle
 from pentapod.verify.surface import surface_left as module
+from pentapod.verify.surface.foreseen import surface_left_along
 from pentapod.verify.surface.surface_left import SurfaceOptions, surface_left
 
 R = 3e-3
@@ -152,6 +153,27 @@ def test_a_beam_covers_what_is_near_its_lines_on_cuts_alone():
     wide = judged(along(*lines[::2], tool=jet), plate(), jet, 1.1e-3)
     assert wide.value == pytest.approx(100.0 * (4.0 - 2.2) / 4.0, rel=0.06)
     assert "beam's line" in wide.method
+
+
+@pytest.mark.parametrize(
+    ("tool", "lines", "left"),
+    [
+        (BallCutter(R), raster(4e-3), 3.8e-4),
+        (FlatEnd(2e-3, flute=0.01), raster(6e-3), 2e-5),
+        (StandOff(5e-3), [line[1:3] + 5e-3 * UP for line in raster(4e-3)], 1.1e-3),
+    ],
+)
+def test_a_toolpath_alone_tells_what_a_program_along_it_leaves(tool, lines, left):
+    """By the same claim, on the waypoints instead of a replay of rows."""
+    replay = along(*lines, tool=tool)
+    found = judged(replay, NARROW, tool, left)
+    coverage = Coverage(Patch.of(NARROW, Region()), left, 0.0, UP)
+    cutting = Cutting(MeshDistance.of(NARROW), tool.solids, 0.0, coverage)
+    foreseen = surface_left_along(replace(replay.specification, cutting=cutting))
+    assert found.value > 10.0
+    assert foreseen.value == pytest.approx(found.value, rel=1e-6)
+    assert not foreseen.passed
+    assert surface_left_along(replace(replay.specification, cutting=None)) is None
 
 
 @pytest.mark.slow

@@ -70,16 +70,21 @@ def missed_by_drops(
 
 @dataclass(frozen=True)
 class ForesightOptions:
-    """When a toolpath is refused since its program would fail its verdict.
+    """When a toolpath is refused, or not planned, since its program would fail its verdict.
 
     certain: share of the length of cuts that is dropped from which the verdict would find the region missed; missed:
-    estimated share of the region that is missed from which it would. As multiples of the share of it that may be left.
+    estimated share of the region that is missed from which it would; leaves: share that a cutter leaves that keeps
+    exactly to the toolpath. As multiples of the share of it that may be left.
     askew_deg: angle between a fixed axis and the direction that the region faces from which it is told.
     """
 
     certain: float = 50.0
     missed: float = 2.0
+    leaves: float = 1.5
     askew_deg: float = 30.0
+
+
+FORESIGHT = ForesightOptions()
 
 
 def foreseen(
@@ -87,7 +92,7 @@ def foreseen(
     reports: Reports,
     toolpath: Toolpath,
     cutting: Cutting | None,
-    options: ForesightOptions = ForesightOptions(),
+    options: ForesightOptions = FORESIGHT,
     *,
     upright: bool = False,
 ) -> Refusal | None:

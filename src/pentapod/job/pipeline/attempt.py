@@ -10,7 +10,7 @@ from typing import Any, Self
 from pentapod.base.refusal import Refusal
 from pentapod.job.advice.options import Tried
 from pentapod.job.artefacts import ARRAYS, PROGRAM, VERDICT, WITHHELD, write_arrays, write_json
-from pentapod.job.build.left import foreseen
+from pentapod.job.build.left import FORESIGHT, foreseen
 from pentapod.job.build.limits import pose_limits
 from pentapod.job.build.pieces import job_piece
 from pentapod.job.build.toolpath import Reports, job_toolpath
@@ -32,6 +32,7 @@ from pentapod.program import Program
 from pentapod.toolpath import Mesh, Toolpath
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.verify import Verdict, judged
+from pentapod.verify.surface.foreseen import surface_left_along
 
 Writer = Callable[[Outcome, Path], object]
 
@@ -96,6 +97,19 @@ class Attempt:
             return None
         self.runner.stages.append(Stage(FORESEEN, 0.0, refusal))
         return self.refused(refusal)
+
+    def foretold(self) -> Outcome | None:
+        """Return the outcome of a toolpath that leaves so much that its program fails; None where that is not known.
+
+        The claim about it is judged on the toolpath.
+        """
+        self.runner.progress("toolpath", 1.0, "what it leaves")
+        left = surface_left_along(self.task.specification)
+        if left is None or (left.value or 0.0) <= FORESIGHT.leaves * (left.bound or 0.0):
+            return None
+        verdict = Verdict((left,), sources=self.task.specification.sources)
+        self.runner.stages.append(Stage(FORESEEN, 0.0, withheld(verdict, foreseen=True)))
+        return self.ended(verdict)
 
     def planned(self) -> Outcome:
         """Run the stages after the toolpath and the verification; write the program, and return the outcome."""

@@ -115,7 +115,8 @@ def _otherwise(attempt: Attempt, failed: Outcome, job: Job, words: str, before: 
     except InputError:  # no cut is left, or its surface is too large: the first refusal says more
         return failed
     again = attempt.with_task(job=job, specification=specification, runner=runner)
-    outcome = _planned(again, failed.find(PlacedPath) if job.axis == task.job.axis else None)
+    start = failed.find(PlacedPath) if job.axis == task.job.axis else None
+    outcome = again.foretold() or _planned(again, start)
     if not outcome.passed:
         outcome = mended(again, outcome)
     last = failed if SURFACE_LEFT in failures(failed.verdict) else before

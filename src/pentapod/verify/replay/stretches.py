@@ -10,7 +10,7 @@ from pentapod.base.arrays import Bools, Floats, Ints, row_lengths
 from pentapod.geometry.directions import angle_between, arc_weights
 from pentapod.geometry.runs import marked_runs
 from pentapod.numerics.blocks import blocks
-from pentapod.verify.replay.replay import Replay
+from pentapod.verify.replay.along_toolpath import Motion
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Stretches:
 
 
 def deviation_bounds(
-    replay: Replay, stretches: Stretches, lever: float, options: StretchOptions = StretchOptions()
+    replay: Motion, stretches: Stretches, lever: float, options: StretchOptions = StretchOptions()
 ) -> Floats:
     """Return upper bounds (n,), metres, on the deviation of points of the tool from the straight stretch, at any time.
 
@@ -65,7 +65,7 @@ def deviation_bounds(
     return np.concatenate([np.empty(0), *(_bounds(replay, part, lever, options.largest_turn) for part in parts)])
 
 
-def _bounds(replay: Replay, of: Stretches, lever: float, largest_turn: float) -> Floats:
+def _bounds(replay: Motion, of: Stretches, lever: float, largest_turn: float) -> Floats:
     # Samples and the chords that they begin; the last sample of a stretch is where it ends.
     counts = of.ends - of.starts
     begins = np.cumsum(counts) - counts

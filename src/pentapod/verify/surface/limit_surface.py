@@ -17,7 +17,7 @@ from scipy.spatial import KDTree
 from pentapod.base.arrays import Bools, Floats
 from pentapod.geometry.solids import Solid
 from pentapod.mesh.query.heightfield import HeightField
-from pentapod.verify.replay.replay import Replay
+from pentapod.verify.replay.along_toolpath import Motion
 from pentapod.verify.surface.reachable import body_reaches, nearest_centres
 from pentapod.verify.verdict.coverage import Coverage
 from pentapod.verify.verdict.cutting import Cutting
@@ -68,7 +68,7 @@ class LimitSurface:
     @classmethod
     def above(
         cls,
-        replay: Replay,
+        replay: Motion,
         coverage: Coverage,
         cutting: Cutting,
         points: Floats,
@@ -106,7 +106,7 @@ class LimitSurface:
     @classmethod
     def _of_body(
         cls,
-        replay: Replay,
+        replay: Motion,
         coverage: Coverage,
         cutting: Cutting,
         points: Floats,
@@ -160,12 +160,12 @@ def under_overhangs(
     return found
 
 
-def is_ball_end(replay: Replay, solid: Solid) -> bool:
+def is_ball_end(replay: Motion, solid: Solid) -> bool:
     """Return whether a solid is the ball about the tilt centre."""
     return solid.is_ball and solid.low == replay.toolpath.tilt_centre
 
 
-def _keeps_its_axis(replay: Replay) -> bool:
+def _keeps_its_axis(replay: Motion) -> bool:
     """Return whether the tool keeps one direction: the toolpath does, and the axis may not leave it."""
     own = replay.toolpath.axes
     return replay.specification.tilt == 0.0 and bool((own @ own[0] > 1.0 - SAME_AXIS).all())

@@ -22,6 +22,7 @@ from pentapod.geometry.solids import Solid
 from pentapod.mesh.patch import Patch
 from pentapod.numerics.blocks import blocks
 from pentapod.toolpath.toolpath import SegmentKind
+from pentapod.verify.replay.along_toolpath import AlongToolpath, Motion
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
 from pentapod.verify.surface.limit_surface import LimitSurface, is_ball_end, under_overhangs
@@ -106,14 +107,15 @@ def surface_left(replay: Replay) -> Finding | Idle:
     area = float(coverage.region.areas.sum())
     if not area > 0.0:
         return Idle("the region has no surface")
-    found = _left_on(replay, coverage, coverage.region, cutting)
+    found = left_on(replay, coverage, coverage.region, cutting)
     share, bound = 100.0 * found.missed / area, 100.0 * coverage.share
     place = replay.place(_nearest_sample(replay, found.place))
     beam = not cutting.cutter
     return Finding(share <= bound, share, bound, "%", place, _method(found, coverage, area, beam=beam))
 
 
-def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting) -> _Left:
+def left_on(replay: Motion, coverage: Coverage, region: Patch, cutting: Cutting, again: int = OPTIONS.again) -> _Left:
+    """Return what a motion leaves on a region. again: as of the options."""
     solids, height = cutting.cutter, coverage.left
     chords = np.ones(len(replay.tilt_centres) - 1, dtype=np.bool_)
     reach = max((solid.largest_radius for solid in solids), default=height)
@@ -146,7 +148,7 @@ def _left_on(replay: Replay, coverage: Coverage, region: Patch, cutting: Cutting
     cells = _Cells(middles[~met], normals[~met], areas[~met], height, reach, (float(highest[0]), highest[1:]), by_ball)
     allowed, count = coverage.share * float(region.areas.sum()), OPTIONS.balls if by_ball else OPTIONS.bodies
     found = _sampled(replay, coverage, cutting, cells, swept, count)
-    for _ in range(OPTIONS.again):
+    for _ in range(again):
         if not (len(cells.areas) > count and _undecided(found.missed, allowed, float(cells.areas.sum()) / count)):
             break
         count *= OPTIONS.more
@@ -177,7 +179,7 @@ def _undecided(missed: float, allowed: float, each: float) -> bool:
 
 
 def _sampled(
-    replay: Replay, coverage: Coverage, cutting: Cutting, cells: _Cells, swept: list[SweptSolid], count: int
+    replay: Motion, coverage: Coverage, cutting: Cutting, cells: _Cells, swept: list[SweptSolid], count: int
 ) -> _Left:
     """Return what is left on cells, of which at most `count` are compared with the limit surface."""
     height, reach = cells.height, cells.reach
@@ -246,8 +248,10 @@ def _chosen(areas: Floats, most: int) -> tuple[Ints, Floats]:
     return chosen, hits * (edges[-1] / most)
 
 
-def _on_cuts(replay: Replay) -> Bools:
+def _on_cuts(replay: Motion) -> Bools:
     """Return which chords (M − 1,) belong to a cut with the beam on, by their middle."""
+    if isinstance(replay, AlongToolpath):
+        return replay.on_cuts()
     toolpath, arcs = replay.toolpath, replay.match.arcs
     ends = arc_length(toolpath.tilt_centres)[toolpath.starts]
     segment = np.searchsorted(ends, 0.5 * (arcs[:-1] + arcs[1:]), side="right") - 1

@@ -13,7 +13,7 @@ from pentapod.geometry.directions import normalised, tangent_frame
 from pentapod.geometry.solids import Solid
 from pentapod.mesh.query.tree import along_morton_curve
 from pentapod.numerics.threads import for_rows, in_threads
-from pentapod.verify.replay.replay import Replay
+from pentapod.verify.replay.along_toolpath import Motion
 from pentapod.verify.replay.stretches import Stretches, StretchOptions, deviation_bounds
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class SweptSolid:
     frame: Floats | None
 
     @classmethod
-    def of(cls, replay: Replay, solid: Solid, chords: Bools, near: float) -> SweptSolid | None:
+    def of(cls, replay: Motion, solid: Solid, chords: Bools, near: float) -> SweptSolid | None:
         """Return the swept volume over some chords (M − 1,) of a replay; None where the motion has no useful bound.
 
         near: stretches are cut until the motion deviates from them by no more, metres, or they are single chords.
@@ -165,7 +165,7 @@ def _of_equal_area(corners: Floats) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(np.unique(np.concatenate([[0], inner, [len(corners)]])).tolist())]
 
 
-def _stretches(replay: Replay, chords: Bools, lever: float, near: float) -> tuple[Stretches, Floats]:
+def _stretches(replay: Motion, chords: Bools, lever: float, near: float) -> tuple[Stretches, Floats]:
     """Return the longest stretches that are near enough to the motion, and the deviations (n,) from them."""
     options = StretchOptions()
     size, todo = options.longest, Stretches.along(chords).cut(options.longest)
