@@ -262,7 +262,7 @@ def test_what_nearer_passes_leave_is_compared_with_the_last_way_that_left_too_mu
         def with_task(self, **_):
             return self
 
-        def foretold(self):
+        def judged_on_toolpath(self):
             return None
 
         def planned(self):
@@ -299,7 +299,7 @@ def test_nearer_passes_begin_at_the_placement_of_the_run_before(way, begins, ref
         def with_task(self, *, start=None, **_):
             return Planned(**{**vars(self), "start": start})
 
-        def foretold(self):
+        def judged_on_toolpath(self):
             return None
 
         def planned(self):

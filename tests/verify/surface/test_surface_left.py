@@ -22,8 +22,8 @@ from pentapod.toolpath.linking.partition import Piece
 from pentapod.verify import Coverage, Cutting
 from pentapod.verify.replay.claim import Idle
 from pentapod.verify.surface import surface_left as module
-from pentapod.verify.surface.foreseen import surface_left_along
 from pentapod.verify.surface.surface_left import SurfaceOptions, surface_left
+from pentapod.verify.surface.surface_left_along import surface_left_along
 
 R = 3e-3
 

@@ -32,7 +32,7 @@ from pentapod.program import Program
 from pentapod.toolpath import Mesh, Toolpath
 from pentapod.toolpath.linking.partition import Piece
 from pentapod.verify import Verdict, judged
-from pentapod.verify.surface.foreseen import surface_left_along
+from pentapod.verify.surface.surface_left_along import surface_left_along
 
 Writer = Callable[[Outcome, Path], object]
 
@@ -98,7 +98,7 @@ class Attempt:
         self.runner.stages.append(Stage(FORESEEN, 0.0, refusal))
         return self.refused(refusal)
 
-    def foretold(self) -> Outcome | None:
+    def judged_on_toolpath(self) -> Outcome | None:
         """Return the outcome of a toolpath that leaves so much that its program fails; None where that is not known.
 
         The claim about it is judged on the toolpath.

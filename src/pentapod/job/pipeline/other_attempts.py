@@ -116,7 +116,7 @@ def _otherwise(attempt: Attempt, failed: Outcome, job: Job, words: str, before: 
         return failed
     again = attempt.with_task(job=job, specification=specification, runner=runner)
     start = failed.find(PlacedPath) if job.axis == task.job.axis else None
-    outcome = again.foretold() or _planned(again, start)
+    outcome = again.judged_on_toolpath() or _planned(again, start)
     if not outcome.passed:
         outcome = mended(again, outcome)
     last = failed if SURFACE_LEFT in failures(failed.verdict) else before

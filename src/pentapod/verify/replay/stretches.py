@@ -52,7 +52,7 @@ class Stretches:
 
 
 def deviation_bounds(
-    replay: Motion, stretches: Stretches, lever: float, options: StretchOptions = StretchOptions()
+    motion: Motion, stretches: Stretches, lever: float, options: StretchOptions = StretchOptions()
 ) -> Floats:
     """Return upper bounds (n,), metres, on the deviation of points of the tool from the straight stretch, at any time.
 
@@ -62,33 +62,33 @@ def deviation_bounds(
     vectors on an arc θ are off the line through two of them by no more than θ²/8.
     """
     parts = [stretches.where(part) for part in blocks(len(stretches.starts), options.at_once)]
-    return np.concatenate([np.empty(0), *(_bounds(replay, part, lever, options.largest_turn) for part in parts)])
+    return np.concatenate([np.empty(0), *(_bounds(motion, part, lever, options.largest_turn) for part in parts)])
 
 
-def _bounds(replay: Motion, of: Stretches, lever: float, largest_turn: float) -> Floats:
+def _bounds(motion: Motion, of: Stretches, lever: float, largest_turn: float) -> Floats:
     # Samples and the chords that they begin; the last sample of a stretch is where it ends.
     counts = of.ends - of.starts
     begins = np.cumsum(counts) - counts
     sample = np.repeat(of.starts - begins, counts) + np.arange(counts.sum())
-    start, end = replay.tilt_centres[of.starts], replay.tilt_centres[of.ends]
-    first, last = replay.axes[of.starts], replay.axes[of.ends]
+    start, end = motion.tilt_centres[of.starts], motion.tilt_centres[of.ends]
+    first, last = motion.axes[of.starts], motion.axes[of.ends]
     chord, turn = end - start, last - first
     square = np.einsum("ij,ij->i", chord, chord) + lever**2 * np.einsum("ij,ij->i", turn, turn)
     owner = np.repeat(np.arange(len(counts)), counts)
-    off, turned = replay.tilt_centres[sample] - start[owner], replay.axes[sample] - first[owner]
+    off, turned = motion.tilt_centres[sample] - start[owner], motion.axes[sample] - first[owner]
     along = np.einsum("ij,ij->i", off, chord[owner]) + lever**2 * np.einsum("ij,ij->i", turned, turn[owner])
     share = np.divide(along, square[owner], out=np.zeros_like(along), where=square[owner] > 0.0)
     share = np.clip(share, 0.0, 1.0)[:, None]
     aside = np.maximum.reduceat(row_lengths(off - share * chord[owner]), begins)
-    deviation = np.maximum.reduceat(replay.interval_bounds.deviations[sample], begins)
+    deviation = np.maximum.reduceat(motion.interval_bounds.deviations[sample], begins)
     if lever == 0.0:
         return aside + deviation
     angle = angle_between(first, last)
     a, b = arc_weights(angle[owner, None], share)
-    swung = replay.axes[sample] - (a * first[owner] + b * last[owner])
+    swung = motion.axes[sample] - (a * first[owner] + b * last[owner])
     apart = np.maximum.reduceat(row_lengths(swung), begins) + 0.125 * angle**2
     tilt = np.arcsin(np.minimum(apart, 1.0)) + np.maximum.reduceat(
-        replay.interval_bounds.axis_deviations[sample], begins
+        motion.interval_bounds.axis_deviations[sample], begins
     )
     # An axis as far as a radius from the arc may point anywhere.
     return np.where((angle < largest_turn) & (apart < 1.0), aside + deviation + lever * tilt, np.inf)

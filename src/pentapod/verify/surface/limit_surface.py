@@ -68,7 +68,7 @@ class LimitSurface:
     @classmethod
     def above(
         cls,
-        replay: Motion,
+        motion: Motion,
         coverage: Coverage,
         cutting: Cutting,
         points: Floats,
@@ -82,9 +82,9 @@ class LimitSurface:
             seen = _seen(coverage, cutting, points + options.above_m * normals, options.above_m)
             return cls(np.where(seen, 0.0, np.nan), points, normals)
         for solid in cutting.cutter:
-            if is_ball_end(replay, solid):
+            if is_ball_end(motion, solid):
                 return cls._of_ball(cutting, coverage, points, normals, solid.rounding, options)
-        return cls._of_body(replay, coverage, cutting, points, normals, options)
+        return cls._of_body(motion, coverage, cutting, points, normals, options)
 
     @classmethod
     def _of_ball(
@@ -106,7 +106,7 @@ class LimitSurface:
     @classmethod
     def _of_body(
         cls,
-        replay: Motion,
+        motion: Motion,
         coverage: Coverage,
         cutting: Cutting,
         points: Floats,
@@ -119,9 +119,9 @@ class LimitSurface:
         tip stays above the lowest point of the part, below which is what the part stands on. Nothing is known of its
         normals: those of the part stand for them.
         """
-        axes = replay.axes[np.asarray(KDTree(replay.tilt_centres[:]).query(points)[1])]
+        axes = motion.axes[np.asarray(KDTree(motion.tilt_centres[:]).query(points)[1])]
         ways, lowest = (axes, normals), -np.inf
-        if coverage.one_direction and _keeps_its_axis(replay):
+        if coverage.one_direction and _keeps_its_axis(motion):
             ways, lowest = (axes,), float((cutting.surface.mesh.vertices @ axes[0]).min())
         steps = np.linspace(0.0, coverage.left, options.steps + 1)
         heights = np.full(len(points), np.nan)
@@ -160,15 +160,15 @@ def under_overhangs(
     return found
 
 
-def is_ball_end(replay: Motion, solid: Solid) -> bool:
+def is_ball_end(motion: Motion, solid: Solid) -> bool:
     """Return whether a solid is the ball about the tilt centre."""
-    return solid.is_ball and solid.low == replay.toolpath.tilt_centre
+    return solid.is_ball and solid.low == motion.toolpath.tilt_centre
 
 
-def _keeps_its_axis(replay: Motion) -> bool:
+def _keeps_its_axis(motion: Motion) -> bool:
     """Return whether the tool keeps one direction: the toolpath does, and the axis may not leave it."""
-    own = replay.toolpath.axes
-    return replay.specification.tilt == 0.0 and bool((own @ own[0] > 1.0 - SAME_AXIS).all())
+    own = motion.toolpath.axes
+    return motion.specification.tilt == 0.0 and bool((own @ own[0] > 1.0 - SAME_AXIS).all())
 
 
 def _seen(coverage: Coverage, cutting: Cutting, points: Floats, within: float) -> Bools:

@@ -114,10 +114,10 @@ def surface_left(replay: Replay) -> Finding | Idle:
     return Finding(share <= bound, share, bound, "%", place, _method(found, coverage, area, beam=beam))
 
 
-def left_on(replay: Motion, coverage: Coverage, region: Patch, cutting: Cutting, again: int = OPTIONS.again) -> _Left:
+def left_on(motion: Motion, coverage: Coverage, region: Patch, cutting: Cutting, again: int = OPTIONS.again) -> _Left:
     """Return what a motion leaves on a region. again: as of the options."""
     solids, height = cutting.cutter, coverage.left
-    chords = np.ones(len(replay.tilt_centres) - 1, dtype=np.bool_)
+    chords = np.ones(len(motion.tilt_centres) - 1, dtype=np.bool_)
     reach = max((solid.largest_radius for solid in solids), default=height)
     # At that height over a plane a ball covers a disc of this radius.
     disc = float(np.sqrt(height * max(2.0 * reach - height, height)))
@@ -125,15 +125,15 @@ def left_on(replay: Motion, coverage: Coverage, region: Patch, cutting: Cutting,
     coarse, fine = max(OPTIONS.coarse * disc, least), max(OPTIONS.coarse * disc / OPTIONS.finest, least)
     if not solids:
         # A beam or spray finishes what is within a ball about its spot, on cuts.
-        spot = replay.toolpath.tilt_centre
-        solids, chords, height = (Solid("cutter", spot, spot, 0.0, 0.0, coverage.left),), _on_cuts(replay), 0.0
+        spot = motion.toolpath.tilt_centre
+        solids, chords, height = (Solid("cutter", spot, spot, 0.0, 0.0, coverage.left),), _on_cuts(motion), 0.0
     corners, normals = np.ascontiguousarray(region.vertices[region.faces]), np.ascontiguousarray(region.facet_normals)
     highest, swept = np.array([0.0, *corners[0].mean(axis=0)]), list[SweptSolid]()
     for solid in solids:
-        one = SweptSolid.of(replay, solid, chords, max(OPTIONS.near_m, OPTIONS.near_share * coverage.left))
+        one = SweptSolid.of(motion, solid, chords, max(OPTIONS.near_m, OPTIONS.near_share * coverage.left))
         if one is not None:
             swept.append(one)
-            replay.kept.setdefault(SweptSolid, []).append(one)
+            motion.kept.setdefault(SweptSolid, []).append(one)
             cells, at = one.uncovered(corners, normals, height, coarse, fine)
             highest = at if at[0] > highest[0] else highest
             corners, normals = cells[:, :9].reshape(-1, 3, 3), np.ascontiguousarray(cells[:, 9:])
@@ -144,15 +144,15 @@ def left_on(replay: Motion, coverage: Coverage, region: Patch, cutting: Cutting,
         one.entries(middles, normals, most)
     met = most <= height
     between = float(areas[met].sum())
-    by_ball = all(is_ball_end(replay, solid) for solid in solids[:1])
+    by_ball = all(is_ball_end(motion, solid) for solid in solids[:1])
     cells = _Cells(middles[~met], normals[~met], areas[~met], height, reach, (float(highest[0]), highest[1:]), by_ball)
     allowed, count = coverage.share * float(region.areas.sum()), OPTIONS.balls if by_ball else OPTIONS.bodies
-    found = _sampled(replay, coverage, cutting, cells, swept, count)
+    found = _sampled(motion, coverage, cutting, cells, swept, count)
     for _ in range(again):
         if not (len(cells.areas) > count and _undecided(found.missed, allowed, float(cells.areas.sum()) / count)):
             break
         count *= OPTIONS.more
-        found = _sampled(replay, coverage, cutting, cells, swept, count)
+        found = _sampled(motion, coverage, cutting, cells, swept, count)
     return replace(found, between=between, cell=2.0 * fine)
 
 
@@ -179,13 +179,13 @@ def _undecided(missed: float, allowed: float, each: float) -> bool:
 
 
 def _sampled(
-    replay: Motion, coverage: Coverage, cutting: Cutting, cells: _Cells, swept: list[SweptSolid], count: int
+    motion: Motion, coverage: Coverage, cutting: Cutting, cells: _Cells, swept: list[SweptSolid], count: int
 ) -> _Left:
     """Return what is left on cells, of which at most `count` are compared with the limit surface."""
     height, reach = cells.height, cells.reach
     chosen, weights = _chosen(cells.areas, count)
     middles, normals = cells.middles[chosen], cells.normals[chosen]
-    limit = LimitSurface.above(replay, coverage, cutting, middles, normals)
+    limit = LimitSurface.above(motion, coverage, cutting, middles, normals)
     known = np.isfinite(limit.heights)
     everywhere, excused = (middles, normals, weights), ~known
     above, middles, weights, unknown = limit.where(known), middles[known], weights[known], float(weights[~known].sum())
@@ -248,11 +248,11 @@ def _chosen(areas: Floats, most: int) -> tuple[Ints, Floats]:
     return chosen, hits * (edges[-1] / most)
 
 
-def _on_cuts(replay: Motion) -> Bools:
+def _on_cuts(motion: Motion) -> Bools:
     """Return which chords (M − 1,) belong to a cut with the beam on, by their middle."""
-    if isinstance(replay, AlongToolpath):
-        return replay.on_cuts()
-    toolpath, arcs = replay.toolpath, replay.match.arcs
+    if isinstance(motion, AlongToolpath):
+        return motion.on_cuts()
+    toolpath, arcs = motion.toolpath, motion.match.arcs
     ends = arc_length(toolpath.tilt_centres)[toolpath.starts]
     segment = np.searchsorted(ends, 0.5 * (arcs[:-1] + arcs[1:]), side="right") - 1
     cutting = np.array([s.kind is SegmentKind.CUT and s.power > 0.0 for s in toolpath.segments])

@@ -1,4 +1,4 @@
-"""Swept volume of a solid of the cutter over a replay, in a tree of boxes, for queries about what it leaves."""
+"""Swept volume of a solid of the cutter over a motion, in a tree of boxes, for queries about what it leaves."""
 
 from __future__ import annotations
 
@@ -48,23 +48,23 @@ class SweptSolid:
     frame: Floats | None
 
     @classmethod
-    def of(cls, replay: Motion, solid: Solid, chords: Bools, near: float) -> SweptSolid | None:
+    def of(cls, motion: Motion, solid: Solid, chords: Bools, near: float) -> SweptSolid | None:
         """Return the swept volume over some chords (M − 1,) of a replay; None where the motion has no useful bound.
 
         near: stretches are cut until the motion deviates from them by no more, metres, or they are single chords.
         """
-        tilt_centre, wide = replay.toolpath.tilt_centre, solid.largest_radius
+        tilt_centre, wide = motion.toolpath.tilt_centre, solid.largest_radius
         # The path of a ball about the tilt centre does not depend on how the tool turns.
         at_tilt_centre = solid.is_ball and solid.low == tilt_centre
         lever = 0.0 if at_tilt_centre else max(abs(solid.low - tilt_centre), abs(solid.high - tilt_centre)) + wide
-        of, off = _stretches(replay, chords, lever, near)
+        of, off = _stretches(motion, chords, lever, near)
         known = off < wide
         of, off = of.where(known), off[known]
         if not len(off):
             return None
-        axes = replay.axes[of.starts], replay.axes[of.ends]
+        axes = motion.axes[of.starts], motion.axes[of.ends]
         drop = solid.low - tilt_centre if solid.is_ball else -tilt_centre
-        ends = replay.tilt_centres[of.starts] + drop * axes[0], replay.tilt_centres[of.ends] + drop * axes[1]
+        ends = motion.tilt_centres[of.starts] + drop * axes[0], motion.tilt_centres[of.ends] + drop * axes[1]
         numbers = np.array((0.0, 0.0, 0.0, 0.0, wide) if solid.is_ball else solid.numbers)
         return cls.along(ends, axes, off, numbers, is_ball=solid.is_ball, near=near)
 
@@ -165,13 +165,13 @@ def _of_equal_area(corners: Floats) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(np.unique(np.concatenate([[0], inner, [len(corners)]])).tolist())]
 
 
-def _stretches(replay: Motion, chords: Bools, lever: float, near: float) -> tuple[Stretches, Floats]:
+def _stretches(motion: Motion, chords: Bools, lever: float, near: float) -> tuple[Stretches, Floats]:
     """Return the longest stretches that are near enough to the motion, and the deviations (n,) from them."""
     options = StretchOptions()
     size, todo = options.longest, Stretches.along(chords).cut(options.longest)
     starts, ends, off = list[Ints](), list[Ints](), list[Floats]()
     while len(todo.starts):
-        far = deviation_bounds(replay, todo, lever, options)
+        far = deviation_bounds(motion, todo, lever, options)
         good = (far <= near) | (size == 1)
         starts.append(todo.starts[good])
         ends.append(todo.ends[good])
