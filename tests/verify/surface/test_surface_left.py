@@ -166,14 +166,22 @@ def test_a_beam_covers_what_is_near_its_lines_on_cuts_alone():
 def test_a_toolpath_alone_tells_what_a_program_along_it_leaves(tool, lines, left):
     """By the same claim, on the waypoints instead of a replay of rows."""
     replay = along(*lines, tool=tool)
-    found = judged(replay, NARROW, tool, left)
+    found = judged(replay, NARROW, tool, left, tilt=0.0)
     coverage = Coverage(Patch.of(NARROW, Region()), left, 0.0, UP)
     cutting = Cutting(MeshDistance.of(NARROW), tool.solids, 0.0, coverage)
-    foreseen = surface_left_along(replace(replay.specification, cutting=cutting))
+    foreseen = surface_left_along(replace(replay.specification, cutting=cutting, tilt=0.0))
     assert found.value > 10.0
     assert foreseen.value == pytest.approx(found.value, rel=1e-6)
     assert not foreseen.passed
     assert surface_left_along(replace(replay.specification, cutting=None)) is None
+
+
+@pytest.mark.parametrize(("tilt", "flute", "told"), [(0.0, 0.02, True), (0.1, None, True), (0.1, 0.02, False)])
+def test_a_toolpath_does_not_tell_what_the_side_of_a_leaning_cutter_leaves(tilt, flute, told):
+    tool = BallCutter(R) if flute is None else BallCutter(R, flute)
+    cutting = Cutting(MeshDistance.of(NARROW), tool.solids, 0.0, Coverage(Patch.of(NARROW, Region()), 3.8e-4, 0.0, UP))
+    asked = replace(along(*raster(4e-3), tool=tool).specification, cutting=cutting, tilt=tilt)
+    assert (surface_left_along(asked) is not None) == told
 
 
 @pytest.mark.slow

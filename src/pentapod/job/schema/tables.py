@@ -229,11 +229,12 @@ class _JobRules(TomlTable):
 
     @model_validator(mode="after")
     def _leaning(self) -> _JobRules:
+        ends = self.tool.type in ("bull", "flat")
         if self.axis.mode == "auto":
             vars(self).update(axis=limited_lean(self.axis, self.tool.type, self.toolpath.strategy))
-        elif self.tool.type in ("bull", "flat") and "tilt_deg" not in self.axis.model_fields_set:
+        elif ends and "tilt_deg" not in self.axis.model_fields_set:
             vars(self).update(axis=by_default(self.axis, 0.0))
-        if self.tool.type in ("bull", "flat") and self.axis.tilt_deg > 0.0:
+        if ends and self.axis.tilt_deg > 0.0:
             wrong("axis.tilt_deg", f'a tool of type "{self.tool.type}" cannot tilt without gouging', "tilt_deg = 0")
         return self
 

@@ -1,7 +1,8 @@
 """Places of a region that a ball cannot touch, and where on its drive surface it comes nearest to them.
 
-Over a pocket narrower than itself the ball rests on the rims, which may be steeper than the region. It touches nothing
-of the region there, but it leaves less over the floor than from any place at which it touches the region.
+Over a pocket narrower than itself the ball rests on the rims, which may be steeper than the region, or beyond its box.
+It touches nothing of the region there, but it leaves less over the floor than from any place at which it touches the
+region.
 """
 
 from __future__ import annotations

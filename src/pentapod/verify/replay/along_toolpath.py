@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from pentapod.base.arrays import Bools
+from pentapod.base.arrays import Floats
 from pentapod.base.values import Value
-from pentapod.toolpath.toolpath import SegmentKind, Toolpath
+from pentapod.geometry.polyline import arc_length
+from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify.replay.interval_bounds import IntervalBounds
 from pentapod.verify.replay.replay import OfSamples, Replay
 from pentapod.verify.verdict.specification import Specification
@@ -55,10 +56,10 @@ class AlongToolpath(Value):
             self.toolpath.tilt_centres, self.toolpath.axes, nothing, nothing, np.zeros((len(nothing), 3))
         )
 
-    def on_cuts(self) -> Bools:
-        """Return which chords (M − 1,) belong to a cut with the beam on."""
-        cutting = np.array([s.kind is SegmentKind.CUT and s.power > 0.0 for s in self.toolpath.segments])
-        return np.asarray(cutting[self.toolpath.segment_of_interval])
+    @cached_property
+    def arcs(self) -> Floats:
+        """How far along the toolpath the waypoints (M,) are, metres."""
+        return arc_length(self.toolpath.tilt_centres)
 
 
 Motion = Replay | AlongToolpath

@@ -23,7 +23,7 @@ from pentapod.toolpath.toolpath import SegmentKind, Toolpath
 from pentapod.verify.replay.free_space import PosedPolyline
 from pentapod.verify.replay.interval_bounds import IntervalBounds, interval_bounds
 from pentapod.verify.replay.path_matching import OPTIONS as MATCHING
-from pentapod.verify.replay.path_matching import PathMatch, match
+from pentapod.verify.replay.path_matching import AtPlaces, PathMatch, match
 from pentapod.verify.replay.row_forces import ROWS_AT_ONCE, RowForces, motion_of_rows
 from pentapod.verify.verdict.specification import Specification
 from pentapod.verify.verdict.verdict import Place
@@ -150,6 +150,11 @@ class Replay(Value):
     def match(self) -> PathMatch:
         """The matching of the samples with the toolpath. Needs a pose at every sample."""
         return self.matched(self.tilt_centres[:])
+
+    @property
+    def arcs(self) -> AtPlaces:
+        """How far along the toolpath the samples (M,) are, metres. Needs a pose at every sample."""
+        return self.match.arcs
 
     def matched(self, tilt_centres: Floats) -> PathMatch:
         """Return the matching of tilt centres (M, 3), with the axes of the samples, with the toolpath."""

@@ -1,4 +1,4 @@
-"""Stretches of a replay that are approximated by a straight motion, and the deviation of the motion from it."""
+"""Stretches of a motion that are approximated by a straight motion, and the deviation of the motion from it."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from pentapod.geometry.solids import Solid
 from pentapod.mesh.patch import Patch
 from pentapod.numerics.blocks import blocks
 from pentapod.toolpath.toolpath import SegmentKind
-from pentapod.verify.replay.along_toolpath import AlongToolpath, Motion
+from pentapod.verify.replay.along_toolpath import Motion
 from pentapod.verify.replay.claim import MM, Claim, Finding, Idle
 from pentapod.verify.replay.replay import Replay
 from pentapod.verify.surface.limit_surface import LimitSurface, is_ball_end, under_overhangs
@@ -250,9 +250,7 @@ def _chosen(areas: Floats, most: int) -> tuple[Ints, Floats]:
 
 def _on_cuts(motion: Motion) -> Bools:
     """Return which chords (M − 1,) belong to a cut with the beam on, by their middle."""
-    if isinstance(motion, AlongToolpath):
-        return motion.on_cuts()
-    toolpath, arcs = motion.toolpath, motion.match.arcs
+    toolpath, arcs = motion.toolpath, motion.arcs
     ends = arc_length(toolpath.tilt_centres)[toolpath.starts]
     segment = np.searchsorted(ends, 0.5 * (arcs[:-1] + arcs[1:]), side="right") - 1
     cutting = np.array([s.kind is SegmentKind.CUT and s.power > 0.0 for s in toolpath.segments])

@@ -49,7 +49,7 @@ class SweptSolid:
 
     @classmethod
     def of(cls, motion: Motion, solid: Solid, chords: Bools, near: float) -> SweptSolid | None:
-        """Return the swept volume over some chords (M − 1,) of a replay; None where the motion has no useful bound.
+        """Return the swept volume over some chords (M − 1,) of a motion; None where the motion has no useful bound.
 
         near: stretches are cut until the motion deviates from them by no more, metres, or they are single chords.
         """
