@@ -103,11 +103,12 @@ def plan(
         best = found.best
         everywhere = problem.at_all(samples)
         if best.smallest < NEEDED_MARGIN:
-            own = OwnLeans.of(everywhere, best)
-            along = own.along_path(progress)
-            if along is None:
-                return _refusal(toolpath, everywhere, own)
-            return _path(toolpath, everywhere, best, along, found.choice)
+            tried: list[OwnLeans] = []
+            for own in OwnLeans.of(everywhere, best).and_wider(samples, tilt if common_axis else 0.0):
+                if (along := own.along_path(progress)) is not None:
+                    return _path(toolpath, own.problem, best, along, found.choice)
+                tried.append(own)
+            return _refusal(toolpath, min(tried, key=lambda own: len(own.unfit) or len(toolpath)))
         keep = max(KEPT_SHARE * best.smallest, NEEDED_MARGIN)
         if secondary_objective is not None and (constraints.moves or problem.samples.tilt > 0.0):
             progress("placement", 1.0, f"margin {best.smallest:.3f}; now the objective {secondary_objective}")
@@ -225,9 +226,9 @@ def _with_margins(
     return PlacedPath(toolpath, placement, branch, *posed, at.margins.limits, common_axis)
 
 
-def _refusal(toolpath: Toolpath, problem: PlacementProblem, own: OwnLeans) -> UnplacedPath:
+def _refusal(toolpath: Toolpath, own: OwnLeans) -> UnplacedPath:
     """Return why a path does not fit at the best placement found; what fits as it leans there needs no other tilts."""
-    best = own.at
+    problem, best = own.problem, own.at
     # Where each fits by itself, no smooth leans were found.
     posed = _posed(problem, best, own.field if own.fit else own.mixed)
     attempt, values = _with_margins(toolpath, problem, best, "best attempt", posed), posed[-1]

@@ -8,14 +8,9 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 import pytest
-import trimesh
 
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.geometry.solids import Solid
-from pentapod.machine.clearance.collision_world import CollisionWorld, Obstacle
-from pentapod.mesh.mesh import Mesh
-from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning import PlacedPath, PlacementConstraints, plan
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.placement import own_leans
@@ -34,18 +29,19 @@ TILT = np.radians(20.0)
 
 @dataclass(frozen=True)
 class Sway:
-    """The axis has to sway along y, from side to side within `wave` metres: at most `off` from a sine of height 0.2."""
+    """The axis has to sway along y, from side to side within `wave` metres: at most `off` from a sine."""
 
     middle: float
     wave: float
     off: float
+    height: float = 0.2
     name: str = "sway"
     unit: str = "1"
     group: str = "bodies"
 
     def margin(self, pose):
         turn = 2.0 * np.pi * (pose.tip[1] - self.middle) / self.wave
-        wanted = 0.2 * (np.sin(turn) if isinstance(turn, np.ndarray) else ca.sin(turn))
+        wanted = self.height * (np.sin(turn) if isinstance(turn, np.ndarray) else ca.sin(turn))
         return 1.0 - (pose.axis[0] - wanted) ** 2 / self.off**2
 
     def shortfall(self, margin):
@@ -168,9 +164,8 @@ def test_a_part_of_the_margin_is_enough_where_no_spline_comes_up_to_it(keep, at_
 def test_leans_come_up_farther_where_the_next_margin_begins_with_a_step_like_the_last(desk, here):
     """With the widest trust region for each margin the search ended at 0.279, with the last one alone as well."""
     asked = options(desk, here, 0.02)
-    problem = PlacementProblem.of(
-        ToolpathSamples.of(zigzag(), TILT), desk, asked["constraints"], limits=asked["limits"]
-    )
+    samples = ToolpathSamples.of(zigzag(), TILT)
+    problem = PlacementProblem.of(samples, desk, asked["constraints"], limits=asked["limits"])
     start = problem.candidate(problem.margins[0], here, problem.upright)
     leans = OwnLeans.of(problem, start).mixed
     reached = [
@@ -202,20 +197,29 @@ def test_leans_far_from_all_limits_are_smoothed(swaying):
     assert spline.cost_of(found) <= spline.cost_of(spline.fitted(leans)) + 1e-12
 
 
-def test_where_all_own_leans_fit_near_the_field_none_is_left_to_try(desk, here):
-    """The tool body is near a post: no margins are asked for without a pose."""
-    post = trimesh.creation.box((0.02, 0.02, 0.03))
-    post.apply_translation([0.1, 0.0, 0.015])
-    world = CollisionWorld(
-        (Obstacle("fixture", MeshDistance.of(Mesh.of(post.vertices, post.faces)), clamped=True),),
-        (Solid("shank", 0.01, 0.05, 0.003, 0.003),),
-    )
-    asked = options(desk, here, 0.03)
-    samples = ToolpathSamples.of(zigzag(), TILT)
-    problem = PlacementProblem.of(samples, desk, asked["constraints"], limits=asked["limits"], collision_world=world)
-    own = OwnLeans.of(problem, problem.candidate(problem.margins[0], here, problem.upright))
-    few = replace(own, rows=own.rows[:0], margins=own.margins[:0], leans=own.leans[:0])
-    np.testing.assert_array_equal(few._near_the_field(), few.field)
+def leaning(path: Toolpath, degrees: float) -> Toolpath:
+    """The path with own axes that lean along y, as on a wall."""
+    axis = [0.0, np.sin(np.radians(degrees)), np.cos(np.radians(degrees))]
+    segments = tuple(replace(each, axes=np.tile(axis, (len(each.tips), 1))) for each in path.segments)
+    return replace(path, segments=segments)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 78.0])
+def test_leans_that_no_cone_of_the_field_holds_are_found_within_the_limit(degrees, desk, here):
+    """The axis has to lean by 24 deg, and a field holds 15; own axes of 78 deg leave it 12 of the limit of 90."""
+    path = leaning(zigzag(), degrees)
+    sway = Sway(float(here.translation[1]), 0.03, 0.08, height=0.4)
+    upright = replace(PlacementConstraints.fixture([here]), upright=np.eye(3)[2], normal=-np.eye(3)[2])
+    asked = {"common_axis": True, "constraints": upright, "limits": (LimitKind(lambda _: [sway]),)}
+    placed = plan(path, desk, tilt=np.radians(90.0), **asked)
+    assert isinstance(placed, PlacedPath), str(placed)
+    assert placed.margins.min() >= NEEDED_MARGIN
+    assert np.ptp(placed.axes[:, 0]) > 0.6
+    leant = angle_between(placed.placement.transform.inverse().rotate(placed.axes), path.axes)
+    assert leant.max() < np.radians(90.0)
+    # Beyond the limit nothing is tried.
+    refused = plan(path, desk, tilt=np.radians(18.0), **asked)
+    assert isinstance(refused, UnplacedPath)
 
 
 def test_what_does_not_fit_by_itself_is_refused_by_name(desk, here):

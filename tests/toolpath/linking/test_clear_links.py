@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 
 import concave_parts
 import toolpath_surfaces as surfaces
@@ -115,6 +116,28 @@ def test_a_tool_along_a_wall_leaves_it_without_a_rapid_that_touches():
     check(found, report, STEM, mesh)
     assert report.relinked == 2
     assert report.stuck == 0
+
+
+def test_a_ball_leaves_the_lower_rim_of_a_hole_upwards():
+    """Below the plate it has more room, but no tool comes from there."""
+    plate = trimesh.creation.annulus(r_min=4e-3, r_max=30e-3, height=5e-3, sections=96)
+    plate.apply_translation([0.0, 0.0, 2.5e-3])
+    mesh = Mesh.of(plate.vertices, plate.faces)
+    turn = np.linspace(0.0, np.pi, 40)
+    around = np.c_[np.cos(turn), np.sin(turn), np.zeros(40)]
+    below = 0.5e-3
+    centres = (4e-3 * np.cos(np.pi / 96) - np.sqrt(9e-6 - below**2) - 1e-6) * around - below * UP
+    tips, axes = centres + 3e-3 * around, -around
+    first, last = (np.stack([tips[k], tips[k] - 0.03 * around[k]]) for k in (0, -1))
+    path = Toolpath((
+        Segment(SegmentKind.RAPID, first[::-1], axes[[0, 0]], np.inf),
+        Segment(SegmentKind.CUT, tips, axes, 0.02),
+        Segment(SegmentKind.RAPID, last, axes[[-1, -1]], np.inf),
+    ), 3e-3)  # fmt: skip
+    found, report = without_gouges(path, BALL, mesh, GougeOptions((Remedy.DROP,), links=STYLE))
+    check(found, report, BALL, mesh)
+    assert (report.relinked, report.dropped, report.stuck) == (2, 0, 0)
+    assert found.tilt_centres[:, 2].min() > -2.0 * below
 
 
 @pytest.mark.slow

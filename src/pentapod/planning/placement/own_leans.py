@@ -1,12 +1,14 @@
 """Leans along a path alone: where no tilt field keeps the limits, or as a plan of nearly the same path has them.
 
 A tilt field is smooth over the part: neighbouring passes lean alike. Where that is not enough, leans may follow the
-path alone, as `AxisSpline` has them. It begins at each waypoint's own best lean where the field falls short.
+path alone, as `AxisSpline` has them. It begins at each waypoint's own best lean where the field falls short. Where no
+lean within the field's cone keeps the limits, as between two walls, wider cones are tried.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,13 +16,16 @@ from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.progress import Progress, silent
+from pentapod.planning.placement.lean_choice import LeanChoice
 from pentapod.planning.placement.placed_path import PlacedPath
 from pentapod.planning.placement.sampling import best_tilted_margins
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
+from pentapod.planning.problem.samples import ToolpathSamples
+from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.problem.weights import NEEDED_MARGIN
 from pentapod.planning.tool_axis.smoothing import OPTIONS as SMOOTHING
 from pentapod.planning.tool_axis.smoothing import smoothed
-from pentapod.planning.tool_axis.spline import AxisSpline
+from pentapod.planning.tool_axis.spline import AxisSpline, stations_of
 from pentapod.toolpath.toolpath import Toolpath
 
 
@@ -28,16 +33,21 @@ from pentapod.toolpath.toolpath import Toolpath
 class LeansOptions:
     """How a spline of leans is begun, and what margin it keeps.
 
-    shares: of the way from the field's lean to a waypoint's own best one that are tried, the nearest first. roomy:
-    margin of the lean that is taken there, as a multiple of the needed one, since the spline does not meet it exactly.
-    kept: share of the smallest margin of a plan of nearly the same path that is kept. lever: metres that one radian of
-    the path's axis counts for, where the waypoint of that plan is sought.
+    roomy: margin of the leans that are chosen, as a multiple of the needed one, since the spline does not meet them
+    exactly; more: factor on it near waypoints, up to `beside` metres of path, at which the spline falls short. rounds:
+    of this. kept: share of the smallest margin of a plan of nearly the same path that is kept. lever: metres that one
+    radian of the path's axis counts for, where the waypoint of that plan is sought. wider_deg: half angles of wider
+    cones. rings: of the grid of tilts, where a waypoint fits with none of a coarser one.
     """
 
-    shares: tuple[float, ...] = tuple(k / 10.0 for k in range(1, 10))
     roomy: float = 1.5
+    more: float = 1.4
+    beside: float = 1e-3
+    rounds: int = 8
     kept: float = 0.9
     lever: float = 0.01
+    wider_deg: tuple[float, ...] = (20.0, 30.0, 45.0)
+    rings: int = 4
 
 
 OPTIONS = LeansOptions()
@@ -66,12 +76,32 @@ class OwnLeans:
         """Return the own leans where a candidate of a problem falls short."""
         field = problem.leans(at.coefficients)
         rows = np.flatnonzero(problem.values_of(at.margins, at.transform, field).min(axis=1) < NEEDED_MARGIN)
-        return cls(problem, at, field, rows, *best_tilted_margins(problem.samples.at(rows), at.margins, at.transform))
+        return cls(problem, at, field, rows, *_best_tilted(problem.samples.at(rows), at))
+
+    def and_wider(self, toolpath: ToolpathSamples, limit: float) -> Iterator[OwnLeans]:
+        """Yield these own leans, and those in wider cones.
+
+        toolpath: with its own axes. limit: largest angle of the tool from these, radians, where it exceeds the cone.
+        """
+        yield self
+        before = self.problem.samples.tilt
+        for degrees in OPTIONS.wider_deg:
+            cone = min(float(np.radians(degrees)), limit)
+            if not 0.0 < before < cone:
+                break
+            samples, before = self.problem.samples.widened(toolpath, cone, limit), cone
+            margins, leans = _best_tilted(samples.at(self.rows), self.at)
+            yield replace(self, problem=self.problem.along(samples), margins=margins, leans=leans)
 
     @cached_property
     def fit(self) -> bool:
         """Whether each waypoint fits by itself."""
-        return bool((self.margins >= NEEDED_MARGIN).all())
+        return not len(self.unfit)
+
+    @cached_property
+    def unfit(self) -> Ints:
+        """The waypoints (k,) that fit with no lean of the grid."""
+        return self.rows[self.margins.min(axis=1) < NEEDED_MARGIN]
 
     @property
     def mixed(self) -> Floats:
@@ -84,20 +114,42 @@ class OwnLeans:
         """Return the leans (N, 3) of the smoothest spline that was found to keep the needed margin; None without."""
         if not self.fit or self.problem.samples.tilt == 0.0:
             return None
-        return _along(self.problem, self.at, ENOUGH, self._near_the_field(), progress)
+        return _along(self.problem, self.at, ENOUGH, self._evenly(), progress)
 
-    def _near_the_field(self) -> Floats:
-        """Return leans (N, 3) that fit, each as near as may be to that of the field."""
-        found, left = self.mixed, np.arange(len(self.rows))
-        for share in OPTIONS.shares:
-            if not len(left):
+    def _evenly(self) -> Floats:
+        """Return leans (N, 3) that turn evenly along the path, and of which a spline is nearest to keep the margin."""
+        problem, places = self.problem, stations_of(self.problem.samples)
+        choice = LeanChoice.of(problem, self.at, self.field, self.rows, places)
+        spline = AxisSpline.of(problem.samples, problem.cone)
+        best, most, wanted = self.field, -np.inf, np.full(len(places), OPTIONS.roomy * NEEDED_MARGIN)
+        for _ in range(OPTIONS.rounds):
+            leans = choice.leans(wanted)
+            values = self._values(spline.leans(spline.fitted(leans)))
+            if (smallest := float(values.min())) > most:
+                best, most = leans, smallest
+            short = np.flatnonzero(values < ENOUGH)
+            if not len(short):
                 break
-            rows = self.rows[left]
-            trial = self.field[rows] + share * (self.leans[left] - self.field[rows])
-            values = self.problem.values_of(self.at.margins, self.at.transform, trial, rows)
-            fits = values.min(axis=1) >= OPTIONS.roomy * NEEDED_MARGIN
-            found[rows[fits]], left = trial[fits], left[~fits]
-        return found
+            away = KDTree(places[short, None]).query(places[:, None])[0]
+            wanted[away < OPTIONS.beside] *= OPTIONS.more
+        return best
+
+    def _values(self, leans: Floats) -> Floats:
+        """Return the smallest margin (N,) at each waypoint; too small beyond the limit of the axes."""
+        problem, samples = self.problem, self.problem.samples
+        values = problem.values_of(self.at.margins, self.at.transform, leans).min(axis=1)
+        inside = samples.inside(lean(samples.nominal, leans))
+        return values if inside is None else np.minimum(values, ENOUGH + inside)
+
+
+def _best_tilted(samples: ToolpathSamples, at: Candidate) -> tuple[Floats, Floats]:
+    """Return margins (n, M) and leans (n, 3) at each waypoint's best tilt; of a finer grid where it does not fit."""
+    margins, leans = best_tilted_margins(samples, at.margins, at.transform)
+    short = np.flatnonzero(margins.min(axis=1) < NEEDED_MARGIN)
+    if len(short):
+        finer = best_tilted_margins(samples.at(short), at.margins, at.transform, rings=OPTIONS.rings)
+        margins[short], leans[short] = finer
+    return margins, leans
 
 
 def leans_as_planned(

@@ -37,7 +37,8 @@ class ToolpathSamples:
 
     tilt_centre: metres from the tip along the axis. tilt: half angle of the cone of axes, radians. shares (N,): of that
     cone (of the tangent of its angle) that may be used at each waypoint; all of it by default. common_axis: towards
-    which the nominal axes lean, None for those of the toolpath.
+    which the nominal axes lean, None for those of the toolpath. own (N, 3), limit: axes of the toolpath, and the
+    largest angle from them, radians, where the cone exceeds it; None where it does not.
     """
 
     tilt_centres: Floats
@@ -46,6 +47,8 @@ class ToolpathSamples:
     tilt: float
     shares: Floats | None = None
     common_axis: CommonAxis | None = None
+    own: Floats | None = None
+    limit: float = np.pi
 
     def __post_init__(self) -> None:
         set_frozen(
@@ -53,6 +56,7 @@ class ToolpathSamples:
             tilt_centres=frozen(self.tilt_centres, "tilt_centres", (None, 3)),
             nominal=frozen(self.nominal, "nominal", (None, 3)),
             shares=None if self.shares is None else frozen(self.shares, "shares", (None,)),
+            own=None if self.own is None else frozen(self.own, "own", (None, 3)),
         )
 
     @classmethod
@@ -66,10 +70,30 @@ class ToolpathSamples:
         shares = common_axis.shares(self.tilt_centres, self.nominal, nominal, self.tilt)
         return replace(self, nominal=nominal, shares=shares, common_axis=common_axis)
 
+    def widened(self, toolpath: ToolpathSamples, cone: float, limit: float) -> ToolpathSamples:
+        """Return samples with a wider cone, radians, all of which may be used within the limit.
+
+        toolpath: with its own axes. limit: largest angle of the tool from these, radians.
+        """
+        if self.common_axis is None:  # the cone is around these axes
+            return replace(self, tilt=cone)
+        most = limit - self.common_axis.options.spare
+        return replace(self, tilt=cone, shares=None, own=toolpath.nominal, limit=most)
+
+    def inside(self, axes: Floats, rows: Ints | slice = slice(None)) -> Floats | None:
+        """Return by how much unit axes (..., 3) at waypoints `rows` keep the limit: a difference of cosines.
+
+        Not negative within it. None where the cone keeps it.
+        """
+        if self.own is None:
+            return None
+        return np.asarray((axes * self.own[rows]).sum(axis=-1) - np.cos(self.limit), dtype=np.float64)
+
     def at(self, rows: Ints) -> ToolpathSamples:
         """Return the samples of the waypoints `rows` only."""
-        shares = None if self.shares is None else self.shares[rows]
-        return replace(self, tilt_centres=self.tilt_centres[rows], nominal=self.nominal[rows], shares=shares)
+        shares, own = (None if each is None else each[rows] for each in (self.shares, self.own))
+        centres, nominal = self.tilt_centres[rows], self.nominal[rows]
+        return replace(self, tilt_centres=centres, nominal=nominal, shares=shares, own=own)
 
     def room(self, rows: Ints | slice = slice(None)) -> Floats:
         """Return the longest lean (n,) at waypoints `rows`, as a share of the cone's."""

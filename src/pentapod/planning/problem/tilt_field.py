@@ -68,15 +68,14 @@ class FieldDomain:
         return np.concatenate(along_both, dtype=np.float64)
 
 
-def tilts(angle: float) -> Floats:
-    """Return lean vectors (K, 2) in a tangent frame that fill a cone of half angle `angle`: centre and two rings."""
-    if angle == 0.0:
-        return np.zeros((1, 2))
-    rings = [np.zeros((1, 2))]
-    for share, count in ((0.5, 6), (0.95, 12)):
-        turn = 2.0 * np.pi * np.arange(count) / count
-        rings.append(share * np.tan(angle) * np.stack([np.cos(turn), np.sin(turn)], axis=1))
-    return np.concatenate(rings)
+def tilts(angle: float, rings: int = 2) -> Floats:
+    """Return lean vectors (K, 2) in a tangent frame that fill a cone of half angle `angle`: its centre and rings."""
+    found = [np.zeros((1, 2))]
+    for ring in range(1, rings + 1 if angle > 0.0 else 1):
+        turn = 2.0 * np.pi * np.arange(6 * ring) / (6 * ring)
+        share = (0.05 * (rings - ring) + 0.95 * ring) / rings
+        found.append(share * np.tan(angle) * np.stack([np.cos(turn), np.sin(turn)], axis=1))
+    return np.concatenate(found)
 
 
 def lean(nominal: Floats, b: Floats) -> Floats:

@@ -17,6 +17,7 @@ from pentapod.numerics.convex.banded_qp import NO_ROWS, BandedQP
 from pentapod.planning.problem.formulation import Slopes, lean_slopes
 from pentapod.planning.problem.linear_model import valleys
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
+from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.tool_axis.cost import AxisCost, CostOptions
 from pentapod.planning.tool_axis.spline import AxisSpline, within_discs
 
@@ -137,7 +138,7 @@ class _Smoothing:
         self.spline = AxisSpline.of(problem.samples, problem.cone)
         self.objective = AxisCost(problem, self.spline, start, options.cost)
         self.slopes: dict[tuple[int, ...], Slopes] = {}
-        self.kinds: Bools = np.zeros(len(start.margins.limits), dtype=bool)
+        self.kinds: Bools = np.zeros(len(start.margins.limits) + (problem.samples.own is not None), dtype=bool)
         self.radius, self.accuracy = options.largest_radius, options.rough
         self.c = self.spline.fitted(problem.leans(start.coefficients) if leans is None else leans)
         self.cost = self.objective.of(self.c)
@@ -199,6 +200,8 @@ class _Smoothing:
 
     def aim(self, keep: float) -> None:
         """Keep another margin from now on."""
+        if self.problem.samples.own is not None:
+            self.margins[:, -1] += keep - self.keep
         self.keep = keep
         self.radius = min(max(2.0 * self.radius, self.options.next_radius), self.options.largest_radius)
         self.short = keep - float(self.margins.min())
@@ -257,25 +260,41 @@ class _Smoothing:
         return less or (short < options.shortfall and gain > options.saving * self.cost)
 
     def values(self, c: Floats, rows: Ints) -> Floats:
-        """Return the margins (n, M) at waypoints `rows`."""
-        return self.problem.values_of(self.start.margins, self.start.transform, self.spline.leans(c, rows), rows)
+        """Return the margins (n, M) at waypoints `rows`; the last one is of the limit of the axes, if there is one."""
+        leans, samples = self.spline.leans(c, rows), self.problem.samples
+        margins = self.problem.values_of(self.start.margins, self.start.transform, leans, rows)
+        inside = samples.inside(lean(samples.nominal[rows], leans), rows)
+        return margins if inside is None else np.column_stack([margins, self.keep + inside])
 
     def model(self) -> _Model:
         """Return the linear model of the margins near the one to keep, and of those that have been short."""
-        spline, start, c = self.spline, self.start, self.c
+        spline, c = self.spline, self.c
         near = (self.margins < self.keep + self.options.near) | self.violated
         looked = np.flatnonzero(near.any(axis=1))
         near, rows = near[looked], self.rows[looked]
         self.kinds |= near.any(axis=0)  # once in, always in: making their function takes longer than calling it
         kinds = np.flatnonzero(self.kinds)
-        key = tuple(kinds.tolist())
-        if key not in self.slopes:
-            self.slopes[key] = lean_slopes(self.problem, start.margins, start.transform, key)
-        slopes = spline.cone * self.slopes[key](spline.frames[rows], spline.cone * (spline.basis[rows] @ c), rows)
+        slopes = spline.cone * self.slopes_at(kinds, spline.cone * (spline.basis[rows] @ c), rows)
         values = self.margins[np.ix_(looked, kinds)]
         reached = values < self.keep + self.options.spare + self.radius * np.linalg.norm(slopes, axis=2)
         point, kind = np.nonzero(near[:, kinds] & reached)
         return _Model(c, looked[point], rows[point], kinds[kind], values[point, kind], slopes[point, kind])
+
+    def slopes_at(self, kinds: Ints, leans: Floats, rows: Ints) -> Floats:
+        """Return the derivatives (n, K, 2) of these margins by leans (n, 2) in the frames at waypoints `rows`."""
+        start, frames = self.start, self.spline.frames[rows]
+        plain = tuple(kinds[kinds < len(start.margins.limits)].tolist())
+        if plain not in self.slopes:
+            self.slopes[plain] = lean_slopes(self.problem, start.margins, start.transform, plain)
+        slopes = self.slopes[plain](frames, leans, rows)
+        if (own := self.problem.samples.own) is None or len(plain) == len(kinds):
+            return slopes
+        # Of the cosine of the angle between own axis and n + b, which is normalised.
+        length = np.sqrt(1.0 + np.square(leans).sum(axis=1, keepdims=True))
+        across = np.einsum("nk,nak->na", own[rows], frames)
+        ahead = (own[rows] * self.problem.samples.nominal[rows]).sum(axis=1, keepdims=True)
+        cosine = (ahead + (across * leans).sum(axis=1, keepdims=True)) / length
+        return np.concatenate([slopes, (across / length - cosine * leans / length**2)[:, None]], axis=1)
 
     def program(self, model: _Model, missed: Floats | None, tried: list[Floats] | None) -> BandedQP:
         """Return the convex program around a model.

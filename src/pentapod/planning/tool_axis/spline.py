@@ -73,18 +73,18 @@ class AxisSpline:
     @classmethod
     def of(cls, samples: ToolpathSamples, cone: float) -> AxisSpline:
         """Return the spline along the waypoints of `samples`. cone: the longest lean (tangent of the angle)."""
-        stations = _stations(samples)
+        places = stations_of(samples)
         extent = float(np.linalg.norm(np.ptp(samples.tilt_centres, axis=0)))
         spacing = min(OPTIONS.knot_spacing, max(extent, OPTIONS.lever) / OPTIONS.intervals_per_extent)
         # Between waypoints the tool moves on straight lines, so derivatives are differences of waypoints. Two nodes for
         # each knot where there are as many: at the knots alone the cost hardly depends on alternating coefficients.
-        nodes = _spaced(stations, spacing / OPTIONS.nodes)
-        basis = sparse.csr_matrix(BSpline.design_matrix(stations, _knots(stations[nodes], spacing), _DEGREE))
+        nodes = _spaced(places, spacing / OPTIONS.nodes)
+        basis = sparse.csr_matrix(BSpline.design_matrix(places, _knots(places[nodes], spacing), _DEGREE))
         if samples.shares is not None:
             basis.data *= np.repeat(samples.shares, np.diff(basis.indptr))
         frames = rotation_minimising_frames(samples.nominal)
-        cost = _cost(samples.nominal[nodes], cone * frames[nodes], basis[nodes], stations[nodes])
-        return cls(cone, basis, frames, nodes, stations[nodes], *cost)
+        cost = _cost(samples.nominal[nodes], cone * frames[nodes], basis[nodes], places[nodes])
+        return cls(cone, basis, frames, nodes, places[nodes], *cost)
 
     def leans(self, c: Floats, rows: Ints | slice = slice(None)) -> Floats:
         """Return the leans (n, 3) at waypoints `rows`, across the nominal axes, workpiece frame."""
@@ -117,7 +117,7 @@ def within_discs(c: Floats) -> Floats:
     return c / np.maximum(1.0, np.linalg.norm(c, axis=1, keepdims=True))
 
 
-def _stations(samples: ToolpathSamples) -> Floats:
+def stations_of(samples: ToolpathSamples) -> Floats:
     """Return the path length (N,) in metres at each waypoint: of the tilt centre, and of the axis by its lever."""
     moved = np.linalg.norm(np.diff(samples.tilt_centres, axis=0), axis=1)
     turned = np.linalg.norm(np.diff(samples.nominal, axis=0), axis=1)

@@ -20,16 +20,18 @@ from pentapod.toolpath.toolpath import Segment, SegmentKind
 
 @dataclass(frozen=True)
 class WayOutSearch(Value):
-    """Which ways out are tried: along the axis, after a step aside, in other directions, then from back on the cut.
+    """Which ways out are tried: along the axis, after a step aside, along the view, in other directions, from back.
 
     withdrawals: lengths on feed, in approaches, before the tool rises along the view; the last way is as long as the
-    part is large. aside: step away from the nearest point of the part, in approaches. leans: angles between axis and
-    other directions, radians; spokes: directions for each. back: shares of the cut that the tool goes back on it.
-    gap: to the part on new rapids, metres. lever: length of a rapid that a turn of one radian needs, metres.
+    part is large. aside: step away from the nearest point of the part, in approaches; little: shorter ones, as in a
+    hole, after which the tool rises. leans: angles between axis and other directions, radians; spokes: directions for
+    each. back: shares of the cut that the tool goes back on it. gap: to the part on new rapids, metres. lever: length
+    of a rapid that a turn of one radian needs, metres.
     """
 
     withdrawals: tuple[float, ...] = (1.0, 3.0, 10.0)
     aside: float = 0.3
+    little: tuple[float, ...] = (0.1, 0.03)
     leans: tuple[float, ...] = (0.35, 0.8, 1.2)
     spokes: int = 8
     back: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
@@ -112,11 +114,15 @@ class WaysOut:
         lengths = [*(length for length in lengths if length < self._size), self._size + reach]
         middle = tip + self.style.approach * axis
         _, away, facet = self.tree.closest(middle[None])
-        length = float(np.linalg.norm(away[0]))
-        beside = tip + self.search.aside * self.style.approach * (away[0] / length if length > 0.0 else axis)
+        off = float(np.linalg.norm(away[0]))
+        aside = self.style.approach * (away[0] / off if off > 0.0 else axis)
         yield from (np.stack([tip, tip + length * axis]) for length in lengths)
         if facet[0] >= 0:
+            beside = tip + self.search.aside * aside
             yield from (np.stack([tip, beside, beside + length * axis]) for length in lengths)
+            for share in (self.search.aside, *self.search.little):
+                beside = tip + share * aside
+                yield from (np.stack([tip, beside, beside + length * self.style.view]) for length in lengths)
         first, second = tangent_frame(axis)
         for lean in self.search.leans:
             for turn in 2.0 * np.pi * np.arange(self.search.spokes) / self.search.spokes:
