@@ -87,7 +87,7 @@ def plan(
     >>> placed.smallest_margin > 0.1
     True
     """
-    samples = _samples(toolpath, tilt, common_axis)
+    samples, limit = _samples(toolpath, tilt, common_axis), tilt if common_axis else 0.0
     whole = PlacementProblem.of(
         samples, machine, constraints, weights,
         component=component, collision_world=collision_world, limits=limits,
@@ -104,7 +104,7 @@ def plan(
         everywhere = problem.at_all(samples)
         if best.smallest < NEEDED_MARGIN:
             tried: list[OwnLeans] = []
-            for own in OwnLeans.of(everywhere, best).and_wider(samples, tilt if common_axis else 0.0):
+            for own in OwnLeans.of(everywhere, best).and_wider(toolpath.axes, limit):
                 if (along := own.along_path(progress)) is not None:
                     return _path(toolpath, own.problem, best, along, found.choice)
                 tried.append(own)
@@ -125,7 +125,10 @@ def plan(
             return planned(np.arange(len(toolpath)))
         return placed
 
-    if start is not None and (again := _as_planned(toolpath, _beside(whole, start), start, progress)) is not None:
+    if (
+        start is not None
+        and (again := _as_planned(toolpath, _beside(whole, start), start, limit, progress)) is not None
+    ):
         return again
     return planned(samples.shaping(toolpath.starts))
 
@@ -194,7 +197,7 @@ def _beside(problem: PlacementProblem, start: PlacedPath) -> PlacementProblem:
 
 
 def _as_planned(
-    toolpath: Toolpath, problem: PlacementProblem, start: PlacedPath, progress: Progress
+    toolpath: Toolpath, problem: PlacementProblem, start: PlacedPath, limit: float, progress: Progress
 ) -> PlacedPath | None:
     """Return the path placed as a plan of nearly the same path that keeps all limits; None where it does not."""
     here = problem.constraints.nearest_to(start.placement.transform)
@@ -202,7 +205,7 @@ def _as_planned(
     if not start.keeps(NEEDED_MARGIN) or margins is None:
         return None
     at = problem.candidate(margins, here, problem.upright)
-    leans = leans_as_planned(problem, at, toolpath, start, progress)
+    leans = leans_as_planned(problem, at, toolpath, start, limit, progress)
     return None if leans is None else _path(toolpath, problem, at, leans, start.placement.chosen_by)
 
 

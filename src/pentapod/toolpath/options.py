@@ -27,6 +27,10 @@ class Entry(StrEnum):
     ARC = "arc"
 
 
+SHORTEST_M, SHORTEST_STEPOVERS = 0.5e-3, 0.2
+"""Length of a pass, metres and stepovers, of which the smaller one decides: small cutters make short passes."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PathOptions(Value):
     """Options of every strategy. Lengths in metres, angles in radians, feeds of the tool tip in m/s.
@@ -51,7 +55,14 @@ class PathOptions(Value):
     hop: Annotated[float, Key("mm", "largest distance between passes for a hop just above the part", ge=0.0)] = 20e-3
     spacing: Annotated[float, Key("mm", "largest distance between waypoints on the surface", gt=0.0)] = 2e-3
     closest: Annotated[float, Key("mm", "waypoints nearer than this are merged, if chordal_mm allows", gt=0.0)] = 10e-6
-    shortest: Annotated[float, Key("mm", "shorter passes are left out, and reported", ge=0.0)] = 0.5e-3
+    shortest: Annotated[
+        float | None,
+        Key(
+            "mm",
+            "shorter passes are left out, and reported; 0.5, or a fifth of the stepover if less, when left out",
+            ge=0.0,
+        ),
+    ] = None
     axis_step: Annotated[float, Key("deg", "largest turn of the axis between waypoints", gt=0.0, le=30.0)] = float(
         np.radians(3.0)
     )
@@ -66,6 +77,12 @@ class PathOptions(Value):
             check_positive(name, getattr(self, name))
         check_fields(self, ToolpathError)
         set_frozen(self, view=unit_vector("view", self.region.direction if self.view is None else self.view))
+
+    def shortest_pass(self, stepover: float) -> float:
+        """Return the length below which passes are left out, metres. stepover: between passes; 0 without."""
+        if self.shortest is not None:
+            return self.shortest
+        return min(SHORTEST_M, SHORTEST_STEPOVERS * stepover) if stepover > 0.0 else SHORTEST_M
 
     @property
     def up(self) -> Floats:

@@ -16,10 +16,10 @@ class PathReport(Value):
     stepover: largest distance between passes along the surface; 0 for lines that do not cover it. stay_downs: links on
     the surface; hops: rapids just above the part; retracts: passes reached by a rapid at the clearance height, with the
     first. travel: total distance between the end of each pass and the start of the next; travel_bound: lower bound of
-    it for any order. dropped: passes shorter than `PathOptions.shortest`; dropped_length: their total length. hidden:
-    waypoints left out because the part lies above them. tight: waypoints where the concave radius of the surface along
-    the pass is below the ball's radius or the stand-off: a ball gouges there, a beam's tip moves backwards. notes: of
-    the strategy. Whether links and rapids are clear of the part is told by the gouge check, which knows the final axes.
+    it for any order. dropped: passes that are too short; dropped_length: their total length. hidden: waypoints left out
+    because the part lies above them. tight: waypoints where the concave radius of the surface along the pass is below
+    the ball's radius or the stand-off: a ball gouges there, a beam's tip moves backwards. notes: of the strategy.
+    Whether links and rapids are clear of the part is told by the gouge check, which knows the final axes.
     """
 
     strategy: str

@@ -82,11 +82,11 @@ def region_patch(surface: Surface, options: PathOptions) -> Patch:
     return patch
 
 
-def empty_region(mesh: Mesh, options: PathOptions, dropped: int = 0) -> ToolpathError:
-    """Return the error of a region in which nothing is left to machine. dropped: passes left out as too short."""
+def empty_region(mesh: Mesh, options: PathOptions, dropped: int = 0, shortest: float = 0.0) -> ToolpathError:
+    """Return the error of a region in which nothing is left to machine. dropped: passes shorter than `shortest`."""
     remedy = why_empty(mesh, options.region)
     if dropped:
-        remedy = f"all {dropped} passes are shorter than {1e3 * options.shortest:.3g} mm"
+        remedy = f"all {dropped} passes are shorter than {1e3 * shortest:.3g} mm"
     return ToolpathError("the region holds nothing to machine", key="region", remedy=remedy)
 
 

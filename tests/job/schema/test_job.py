@@ -7,6 +7,7 @@ import pytest
 
 from pentapod.base.errors import JobError
 from pentapod.job import Job
+from pentapod.job.build.toolpath import job_options
 from pentapod.job.build.values import job_mesh
 from pentapod.job.schema.strategies import job_strategies
 from pentapod.job.schema.tables import JobTables, table_model
@@ -139,6 +140,7 @@ def test_digest_follows_the_meaning(make_job, tmp_path):
         (FEED, "cut_mm_min = 3000.0"),
         ("tilt_deg = 0", "tilt_deg = 0.0  # said again"),
         ("spacing_mm = 4", "spacing_mm = 4\nclearance_mm = 10"),  # the default
+        ("spacing_mm = 4", "spacing_mm = 4\nshortest_mm = 0.5"),  # what it is with this stepover
     ]
     assert {Job.load(make_job(change)).digest for change in same} == {digest}
     others = [
@@ -155,6 +157,15 @@ def test_digest_follows_the_meaning(make_job, tmp_path):
     changed = bytearray((tmp_path / "part.stl").read_bytes())
     changed[100] ^= 1
     assert Job.load(make_job(mesh=bytes(changed))).digest != digest
+
+
+def test_the_shortest_pass_follows_a_small_stepover(make_job):
+    """Passes of a small cutter are short; a digest does not depend on whether the number is said."""
+    wide, narrow, said = ((STEP, f"stepover_mm = {text}") for text in ("3", "1", "1\nshortest_mm = 0.5"))
+    options = [job_options(Job.load(make_job(change))) for change in (wide, narrow, said)]
+    lengths = [each.shortest_pass(each.stepover) for each in options]
+    np.testing.assert_allclose(lengths, [0.5e-3, 0.2e-3, 0.5e-3])
+    assert Job.load(make_job(narrow)).digest != Job.load(make_job(said)).digest
 
 
 AUTO = ("tilt_deg = 0", 'mode = "auto"')

@@ -112,7 +112,7 @@ def test_leans_that_keep_a_part_of_the_margin_are_not_searched_for_again(desk, h
     planner = importlib.import_module("pentapod.planning.plan")
     searched = planner._searched
     monkeypatch.setattr(planner, "_searched", counted)
-    monkeypatch.setattr(own_leans, "ENOUGH", 0.6 * NEEDED_MARGIN)
+    monkeypatch.setattr(own_leans, "ENOUGH", 0.3 * NEEDED_MARGIN)
     monkeypatch.setattr(ToolpathSamples, "shaping", lambda samples, _: np.arange(0, len(samples.tilt_centres), 3))
     placed = plan(zigzag(), desk, **options(desk, here, 0.03))
     assert isinstance(placed, PlacedPath), str(placed)

@@ -268,6 +268,15 @@ def test_short_passes_are_dropped_and_reported():
     assert "short passes dropped" in str(report)
 
 
+def test_passes_of_a_narrow_strip_count_where_their_stepover_is_small():
+    """A strip of 0.3 mm across the passes was left out as a whole."""
+    strip = Mesh.of(*surfaces.grid(lambda x, y: 0 * x, cells=20, width=0.3e-3))
+    report = toolpath_with_report(strip, BallCutter(0.2e-3), RasterOptions(stepover=0.1e-3))[1]
+    assert report.dropped == 0
+    with pytest.raises(ToolpathError, match="shorter than 0.5 mm"):
+        toolpath_with_report(strip, BallCutter(0.2e-3), RasterOptions(stepover=0.1e-3, shortest=0.5e-3))
+
+
 @settings(max_examples=examples(2, 4), deadline=None)
 @given(angle=st.floats(-3.0, 3.0), scale=st.floats(0.3, 3.0))
 def test_turning_and_scaling_the_part_turns_and_scales_the_path(angle, scale):

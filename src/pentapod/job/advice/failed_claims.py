@@ -167,8 +167,10 @@ class FailedClaims:
     @property
     def _accepted(self) -> float:
         """Share of the region that would have to be left for a program to pass; infinite where that does not help."""
-        own = [self.failed[_LEFT].value] if set(self.failed) == {_LEFT} else []
-        left = min((each for each in (*own, self.left) if each is not None), default=0.0)
+        own = self.failed[_LEFT].value if set(self.failed) == {_LEFT} else None
+        left = min((each for each in (own, self.left) if each is not None), default=0.0)
+        if own is not None and own <= self.options.about * left:  # judged on its program; another way is planned again
+            left = own
         return _longer(1e-2 * self.options.more * left) if left > 0.0 else np.inf
 
     def _finer(self) -> Iterator[tuple[str, Changes]]:

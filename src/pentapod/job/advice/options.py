@@ -51,7 +51,8 @@ class AdviceOptions(Value):
     left; near_share: steps along the toolpath, in radii of the ball; surely: share of what may be left that the
     estimate must keep to; little: share of the region that may stay as it is, where nothing else helps; hardly: that
     may before anything else is planned; long: waypoints from which other ways take minutes, so that `little` may
-    before; more: what is allowed then, as a multiple of what is left.
+    before; more: what is allowed then, as a multiple of what is left; about: up to this multiple of what another way
+    leaves, the program as it is counts.
     """
 
     wanted: int = 1
@@ -97,6 +98,7 @@ class AdviceOptions(Value):
     little: float = 0.02
     long: int = 10_000
     more: float = 1.2
+    about: float = 2.0
 
 
 OPTIONS = AdviceOptions()

@@ -34,6 +34,7 @@ from pentapod.timing import Limit
 from pentapod.toolpath import Mesh
 from pentapod.toolpath.linking.partition import Piece, missed_cuts
 from pentapod.verify import Claim
+from pentapod.verify.surface.surface_left import SURFACE_LEFT
 
 
 def planned(
@@ -87,8 +88,9 @@ def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried],
     def tried(job: Job, progress: Progress) -> Tried:
         if job.with_(tolerance={"left_share": task.job.tolerance.left_share}).tables != task.job.tables:
             return again(job, progress)
-        if frozenset(failed) == LEFT_ALONE:
-            return attempt.tried_with(job.tolerance.left_share, outcome)
+        own, share = failed.get(SURFACE_LEFT), job.tolerance.left_share
+        if own is not None and frozenset(failed) == LEFT_ALONE and (own.value or 0.0) <= 100.0 * share:
+            return attempt.tried_with(share, outcome)
         if refusal.stage != "placement":
             return again(job, progress)
         # The plan does what this run did, and goes on from there.

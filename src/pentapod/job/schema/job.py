@@ -18,11 +18,13 @@ from pydantic import BaseModel, ValidationError
 from pentapod.base.errors import JobError, nearest
 from pentapod.base.tables import TomlTable, problem_of
 from pentapod.base.toml import line_of, parsed, read_toml
+from pentapod.base.units import from_si
 from pentapod.base.values import Value
 from pentapod.cutters.registry import CUTTERS
 from pentapod.job.schema.strategies import file_keys, job_strategies, strategy_table
 from pentapod.job.schema.tables import JobTables, table_model
 from pentapod.mesh.io.registry import MESH_FORMATS
+from pentapod.toolpath.options import SHORTEST_M, SHORTEST_STEPOVERS
 
 _VARIABLE = re.compile(r"\$\{(\w+)\}")
 Content = Mapping[str, Any]
@@ -181,6 +183,11 @@ class Job(Value):
         for table, key in LATER_KEYS:
             if content[table][key] is None:
                 del content[table][key]
+        lines, usual = content["toolpath"], from_si(SHORTEST_M, "mm")
+        stepover = lines.get("stepover_mm")
+        usually = stepover is None or SHORTEST_STEPOVERS * stepover >= usual
+        if usually and lines.get("shortest_mm", usual) is None:
+            lines["shortest_mm"] = usual  # as in the digests of earlier versions, of whatever stepover
         del content["part"]["stock_mm"]
         if not self.part.flip:
             del content["part"]["flip"]

@@ -33,14 +33,16 @@ from pentapod.toolpath.toolpath import Toolpath
 class LeansOptions:
     """How a spline of leans is begun, and what margin it keeps.
 
-    roomy: margin of the leans that are chosen, as a multiple of the needed one, since the spline does not meet them
-    exactly; more: factor on it near waypoints, up to `beside` metres of path, at which the spline falls short. rounds:
-    of this. kept: share of the smallest margin of a plan of nearly the same path that is kept. lever: metres that one
-    radian of the path's axis counts for, where the waypoint of that plan is sought. wider_deg: half angles of wider
-    cones. rings: of the grid of tilts, where a waypoint fits with none of a coarser one.
+    spare: margin that leans along the path should keep, as a multiple of the needed one, as the tool may come nearer to
+    the part between waypoints. roomy: margin of the leans that are chosen, as such a multiple, since the spline does
+    not meet them exactly; more: factor on it near waypoints, up to `beside` metres of path, at which the spline falls
+    short. rounds: of this. kept: share of the smallest margin of a plan of nearly the same path that is kept. lever:
+    metres that one radian of the path's axis counts for, where the waypoint of that plan is sought. wider_deg: half
+    angles of wider cones. rings: of the grid of tilts, where a waypoint fits with none of a coarser one.
     """
 
-    roomy: float = 1.5
+    spare: float = 2.0
+    roomy: float = 2.5
     more: float = 1.4
     beside: float = 1e-3
     rounds: int = 8
@@ -51,6 +53,9 @@ class LeansOptions:
 
 
 OPTIONS = LeansOptions()
+
+QUICKLY = replace(SMOOTHING, decrease=1e-2, steps=25, enough=0.25)
+"""How leans that turn evenly already are smoothed: more steps change the cycle time by some thousandths."""
 
 ENOUGH = NEEDED_MARGIN + 2.0 * SMOOTHING.slack
 """Margin that a spline is asked to keep, so that it has the needed one."""
@@ -75,23 +80,15 @@ class OwnLeans:
     def of(cls, problem: PlacementProblem, at: Candidate) -> OwnLeans:
         """Return the own leans where a candidate of a problem falls short."""
         field = problem.leans(at.coefficients)
-        rows = np.flatnonzero(problem.values_of(at.margins, at.transform, field).min(axis=1) < NEEDED_MARGIN)
+        rows = np.flatnonzero(problem.values_of(at.margins, at.transform, field).min(axis=1) < OPTIONS.spare * ENOUGH)
         return cls(problem, at, field, rows, *_best_tilted(problem.samples.at(rows), at))
 
-    def and_wider(self, toolpath: ToolpathSamples, limit: float) -> Iterator[OwnLeans]:
-        """Yield these own leans, and those in wider cones.
-
-        toolpath: with its own axes. limit: largest angle of the tool from these, radians, where it exceeds the cone.
-        """
+    def and_wider(self, own: Floats, limit: float) -> Iterator[OwnLeans]:
+        """Yield these own leans, and those in wider cones. own, limit: as for `in_cones`."""
         yield self
-        before = self.problem.samples.tilt
-        for degrees in OPTIONS.wider_deg:
-            cone = min(float(np.radians(degrees)), limit)
-            if not 0.0 < before < cone:
-                break
-            samples, before = self.problem.samples.widened(toolpath, cone, limit), cone
-            margins, leans = _best_tilted(samples.at(self.rows), self.at)
-            yield replace(self, problem=self.problem.along(samples), margins=margins, leans=leans)
+        for wide in in_cones(self.problem, own, limit)[1:]:
+            margins, leans = _best_tilted(wide.samples.at(self.rows), self.at)
+            yield replace(self, problem=wide, margins=margins, leans=leans)
 
     @cached_property
     def fit(self) -> bool:
@@ -114,7 +111,7 @@ class OwnLeans:
         """Return the leans (N, 3) of the smoothest spline that was found to keep the needed margin; None without."""
         if not self.fit or self.problem.samples.tilt == 0.0:
             return None
-        return _along(self.problem, self.at, ENOUGH, self._evenly(), progress)
+        return _along(self.problem, self.at, OPTIONS.spare * ENOUGH, self._evenly(), progress)
 
     def _evenly(self) -> Floats:
         """Return leans (N, 3) that turn evenly along the path, and of which a spline is nearest to keep the margin."""
@@ -127,7 +124,7 @@ class OwnLeans:
             values = self._values(spline.leans(spline.fitted(leans)))
             if (smallest := float(values.min())) > most:
                 best, most = leans, smallest
-            short = np.flatnonzero(values < ENOUGH)
+            short = np.flatnonzero(values < OPTIONS.spare * ENOUGH)
             if not len(short):
                 break
             away = KDTree(places[short, None]).query(places[:, None])[0]
@@ -139,7 +136,7 @@ class OwnLeans:
         problem, samples = self.problem, self.problem.samples
         values = problem.values_of(self.at.margins, self.at.transform, leans).min(axis=1)
         inside = samples.inside(lean(samples.nominal, leans))
-        return values if inside is None else np.minimum(values, ENOUGH + inside)
+        return values if inside is None else np.minimum(values, OPTIONS.spare * ENOUGH + inside)
 
 
 def _best_tilted(samples: ToolpathSamples, at: Candidate) -> tuple[Floats, Floats]:
@@ -152,12 +149,31 @@ def _best_tilted(samples: ToolpathSamples, at: Candidate) -> tuple[Floats, Float
     return margins, leans
 
 
+def in_cones(problem: PlacementProblem, own: Floats, limit: float) -> list[PlacementProblem]:
+    """Return a problem, and the same one with wider cones.
+
+    own (N, 3): axes of the toolpath. limit: largest angle of the tool from these, radians, where it exceeds the cone.
+    """
+    found = [problem]
+    for degrees in OPTIONS.wider_deg:
+        cone = min(float(np.radians(degrees)), limit)
+        if 0.0 < found[-1].samples.tilt < cone:
+            found.append(problem.along(problem.samples.widened(own, cone, limit)))
+    return found
+
+
 def leans_as_planned(
-    problem: PlacementProblem, at: Candidate, path: Toolpath, placed: PlacedPath, progress: Progress = silent
+    problem: PlacementProblem,
+    at: Candidate,
+    path: Toolpath,
+    placed: PlacedPath,
+    limit: float,
+    progress: Progress = silent,
 ) -> Floats | None:
     """Return leans (N, 3) of a path near those of a plan of nearly the same path; None where none were found.
 
-    problem: at all waypoints of the path, with the common axis of that plan; at: a candidate at its placement.
+    problem: at all waypoints of the path, with the common axis of that plan; at: a candidate at its placement. limit:
+    as for `in_cones`.
     """
     samples, options = problem.samples, OPTIONS
     if samples.tilt == 0.0:
@@ -167,9 +183,12 @@ def leans_as_planned(
     leans = axes / (axes * samples.nominal).sum(axis=1, keepdims=True) - samples.nominal
     smallest = float(problem.values_of(at.margins, at.transform, leans).min())
     keep = max(ENOUGH, min(options.kept * placed.smallest_margin, smallest))
-    return _along(problem, at, keep, leans, progress)
+    steepest = np.linalg.norm(leans, axis=1)
+    cones = in_cones(problem, path.axes, limit)
+    wide = next((each for each in cones if (steepest <= each.longest()).all()), cones[-1])
+    return _along(wide, at, keep, leans, progress)
 
 
 def _along(problem: PlacementProblem, at: Candidate, keep: float, leans: Floats, progress: Progress) -> Floats | None:
-    spline = smoothed(problem, at, keep, progress=progress, leans=leans)
+    spline = smoothed(problem, at, keep, QUICKLY, progress, leans)
     return None if spline is None else AxisSpline.of(problem.samples, problem.cone).leans(spline)

@@ -70,15 +70,15 @@ class ToolpathSamples:
         shares = common_axis.shares(self.tilt_centres, self.nominal, nominal, self.tilt)
         return replace(self, nominal=nominal, shares=shares, common_axis=common_axis)
 
-    def widened(self, toolpath: ToolpathSamples, cone: float, limit: float) -> ToolpathSamples:
+    def widened(self, own: Floats, cone: float, limit: float) -> ToolpathSamples:
         """Return samples with a wider cone, radians, all of which may be used within the limit.
 
-        toolpath: with its own axes. limit: largest angle of the tool from these, radians.
+        own (N, 3): axes of the toolpath. limit: largest angle of the tool from these, radians.
         """
         if self.common_axis is None:  # the cone is around these axes
             return replace(self, tilt=cone)
         most = limit - self.common_axis.options.spare
-        return replace(self, tilt=cone, shares=None, own=toolpath.nominal, limit=most)
+        return replace(self, tilt=cone, shares=None, own=own, limit=most)
 
     def inside(self, axes: Floats, rows: Ints | slice = slice(None)) -> Floats | None:
         """Return by how much unit axes (..., 3) at waypoints `rows` keep the limit: a difference of cosines.

@@ -51,16 +51,17 @@ def assembled(
     ToolpathError if no pass is left.
     """
     passes, source, hidden = _waypoints(paths, surface, options, assembly)
-    long = passes.lengths >= options.shortest
+    shortest = options.shortest_pass(paths.stepover)
+    long = passes.lengths >= shortest
     dropped, dropped_length = int((~long).sum()), float(passes.lengths[~long].sum())
     passes, source = passes.where(long), source[long]
     if not len(passes):
-        raise empty_region(surface.part, options, dropped)
+        raise empty_region(surface.part, options, dropped, shortest)
     # A pass may become several: levels carry its number meanwhile.
     levels = passes.levels
     passes = surface.waypoints(replace(passes, levels=np.arange(len(passes))), options)
     if not len(passes):
-        raise empty_region(surface.part, options, dropped)
+        raise empty_region(surface.part, options, dropped, shortest)
     source, passes = source[passes.levels], replace(passes, levels=levels[passes.levels])
     power = np.ones(len(passes)) if paths.power is None else paths.power[source]
     reach = assembly.reach * paths.stepover if options.stay is None else options.stay

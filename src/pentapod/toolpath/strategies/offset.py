@@ -80,7 +80,8 @@ def offset_paths(surface: Surface, options: OffsetOptions) -> ContactPaths:
     levels: Floats = np.arange(first, max(furthest, first) + 0.5, 1.0)
     distance = np.where(reached, field.distance, float(levels[-1]) + 1.0)
     level_set = LevelSet(patch, distance, levels, inside=field.inside)
-    cuts = lines_as_sources(level_set, field.steps, shortest=options.shortest)
+    shortest = options.shortest_pass(float(field.steps.max()))
+    cuts = lines_as_sources(level_set, field.steps, shortest=shortest)
     lines = [cuts, *([] if field.curve is None else [field.curve])]
     passes = Passes.joined([field.on_curve, level_set.lines(), gap_lines(patch, Sources.joined(lines), field.steps)])
     missed = 1.0 - float(patch.areas[reached[patch.faces].all(axis=1)].sum() / patch.areas.sum())

@@ -40,7 +40,7 @@ def pencil_paths(surface: Surface, options: PencilOptions) -> ContactPaths:
             "only a ball follows concave corners", key="strategy", value="pencil", remedy="use a ball cutter"
         )
     lines = crease_lines(region_patch(surface, options), options.sharpest)
-    lines = lines.where(lines.lengths >= max(options.shortest, surface.radius))
+    lines = lines.where(lines.lengths >= max(options.shortest or 0.0, surface.radius))
     if not len(lines):
         given = options.sharpest != CreaseOptions.sharpest
         key, value = ("sharpest", options.sharpest) if given else ("strategy", "pencil")

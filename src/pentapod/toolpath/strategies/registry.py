@@ -136,8 +136,9 @@ def with_fills(surface: Surface, paths: ContactPaths, options: PathOptions) -> C
     passes = Passes.joined([paths.passes, lines])
     hides = partial(surface.hides, slack=options.chordal)
     if isinstance(surface, DriveSurface):
+        shortest = options.shortest_pass(paths.stepover)
         for left in patches:
-            rest = rest_lines(left, passes, surface.radius, paths.stepover, hides, surface.rising, options.shortest)
+            rest = rest_lines(left, passes, surface.radius, paths.stepover, hides, surface.rising, shortest)
             passes = Passes.joined([passes, rest])
     return replace(paths, passes=passes) if len(passes) > len(paths.passes) else paths
 

@@ -73,7 +73,8 @@ def _offset(surface: Surface, options: SpiralOptions) -> ContactPaths:
     centre = field.drawn.patch.vertices[finite.argmax()] if options.centre is None else np.asarray(options.centre)
     # One closed turn at half a step from the border, and the spiral from there inwards.
     ring = LevelSet(field.drawn.patch, finite, np.array([0.5]), inside=field.inside)
-    cuts = partial(lines_as_sources, steps=field.steps, shortest=options.shortest)
+    shortest = options.shortest_pass(float(field.steps.max()))
+    cuts = partial(lines_as_sources, steps=field.steps, shortest=shortest)
     inner = PatchOn.of(field.drawn.patch, lambda patch: patch.above(finite, 0.5)[0])
     if not len(inner.patch.faces):
         gaps = gap_lines(field.drawn.patch, cuts(ring), field.steps)
@@ -111,7 +112,8 @@ def _planar(surface: Surface, options: SpiralOptions) -> ContactPaths:
 
     itself = PatchOn.of(patch, lambda same: same)
     spiral, kept = _wound(itself, turn, 0.0, centre, options.up)
-    sources = lines_as_sources(spiral, steps, shortest=options.shortest).placed(itself.where(kept))
+    shortest = options.shortest_pass(float(steps.max()))
+    sources = lines_as_sources(spiral, steps, shortest=shortest).placed(itself.where(kept))
     passes = Passes.joined([spiral.lines(), gap_lines(patch, sources, steps)])
     return ContactPaths(passes, float(steps.max()), Order.ZIGZAG)
 
