@@ -273,7 +273,7 @@ def test_passes_of_a_narrow_strip_count_where_their_stepover_is_small():
     strip = Mesh.of(*surfaces.grid(lambda x, y: 0 * x, cells=20, width=0.3e-3))
     report = toolpath_with_report(strip, BallCutter(0.2e-3), RasterOptions(stepover=0.1e-3))[1]
     assert report.dropped == 0
-    with pytest.raises(ToolpathError, match="shorter than 0.5 mm"):
+    with pytest.raises(ToolpathError, match=r"shorter than 0\.5 mm"):
         toolpath_with_report(strip, BallCutter(0.2e-3), RasterOptions(stepover=0.1e-3, shortest=0.5e-3))
 
 
