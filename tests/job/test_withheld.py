@@ -14,6 +14,7 @@ from pentapod.job.build.left import foreseen, missed_by_drops
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import Reports, job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.job.pipeline.run import tried
 from pentapod.job.withheld import withheld
 from pentapod.mesh.io.stl import write_stl
 from pentapod.toolpath.gouge.report import GougeReport
@@ -63,6 +64,18 @@ def test_a_program_that_fails_its_verdict_is_not_left_as_program(tmp_path):
     assert json.loads((out / "verdict.json").read_text())["refusal"]["stage"] == "verdict"
     assert run(job, out).passed
     assert {path.name for path in out.iterdir()} == {"program.csv", "plan.npz", "verdict.json", "manifest.json"}
+
+
+def test_a_plan_for_advice_is_not_made_where_its_toolpath_leaves_too_much(tmp_path):
+    """As often as not, too much was left for the same reason as in the run."""
+    (tmp_path / "part.stl").write_bytes(dome_stl(cells=12))
+    (tmp_path / "job.toml").write_text(job_text(), encoding="utf-8")
+    stages: set[str] = set()
+    job = Job.load(tmp_path / "job.toml").with_(tolerance={"left_mm": 0.05})
+    ended = tried(job, lambda stage, *_: stages.add(stage), left_first=True)
+    assert ended == Tried("verdict", failed=frozenset((SURFACE_LEFT,)))
+    assert "toolpath" in stages
+    assert "placement" not in stages
 
 
 def test_a_toolpath_that_leaves_out_what_the_shank_forbids_is_refused_before_it_is_planned(tmp_path):

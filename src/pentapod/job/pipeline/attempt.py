@@ -64,14 +64,16 @@ def made_toolpath(
 class Attempt:
     """A plan of a job in one way.
 
-    mesh: of the job's part. staging: the folder for its files. writers: further files, by name. unplaced: outcomes of
-    mends for which no placement was found, whatever may be left of the region.
+    mesh: of the job's part. staging: the folder for its files. writers: further files, by name. left_first: whether
+    what its toolpath leaves is judged before it is planned. unplaced: outcomes of mends for which no placement was
+    found, whatever may be left of the region.
     """
 
     task: Task
     mesh: Mesh
     staging: Path
     writers: Mapping[str, Writer]
+    left_first: bool = False
     unplaced: dict[Mend, Outcome] = dataclasses.field(default_factory=dict)
 
     @property

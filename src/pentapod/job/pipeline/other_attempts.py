@@ -32,7 +32,10 @@ def first_that_passes(attempt: Attempt, outcome: Outcome | None = None) -> Outco
     would leave out much stands upright at first. outcome: of the job as asked, where it is known.
     """
     upright = ends(attempt.task.job) and may_stand(attempt.task.job)
-    outcome = outcome or attempt.foreseen(upright=upright) or attempt.planned()
+    outcome = outcome or attempt.foreseen(upright=upright)
+    if outcome is None and attempt.left_first:
+        outcome = attempt.judged_on_toolpath()
+    outcome = outcome or attempt.planned()
     if outcome.refusal is None:
         return outcome
     outcome = mended(attempt, outcome)

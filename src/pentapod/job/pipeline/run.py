@@ -87,8 +87,12 @@ def _attempted(
     writers: Mapping[str, Writer] | None = None,
     limits: tuple[Limit, ...] = (),
     claims: tuple[Claim, ...] = (),
+    left_first: bool = False,
 ) -> tuple[Attempt, Outcome]:
-    """Plan a job, write its program into `staging`, and return the attempt and its outcome. Else as `run`."""
+    """Plan a job, write its program into `staging`, and return the attempt and its outcome. Else as `run`.
+
+    left_first: as of `Attempt`.
+    """
     if before is not None:
         # Loads what a part that cannot fit does not need.
         from pentapod.job.build.other_ways import as_made  # noqa: PLC0415
@@ -106,12 +110,14 @@ def _attempted(
         check_wide_part(job, used, mesh)
     return planned(
         job, used, mesh, runner, staging, writers or {}, own_machine=machine is not None,
-        piece=piece, before=before, limits=limits, claims=claims,
+        piece=piece, before=before, limits=limits, claims=claims, left_first=left_first,
     )  # fmt: skip
 
 
 def tried(job: Job, progress: Progress = silent, **given: Any) -> Tried:
-    """Return how the plan of a job ends. Nothing of it is kept. given: machine, limits and claims as for `run`.
+    """Return how the plan of a job ends. Nothing of it is kept.
+
+    given: machine, limits and claims as for `run`, left_first as of `Attempt`.
 
     Raises InputError as `run`, and KeyboardInterrupt where it would go on with the best that a search found till then.
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import tempfile
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 from pentapod.base.progress import Progress
@@ -50,12 +51,13 @@ def planned(
     before: PlanBefore | None,
     limits: tuple[Limit, ...],
     claims: tuple[Claim, ...],
+    left_first: bool,
 ) -> tuple[Attempt, Outcome]:
     """Plan a job whose mesh was read, write its program into `staging`, and return the attempt and its outcome.
 
     Of a job in several set-ups each has all its files in a folder of its own.
-    machine, mesh: those of the job. own_machine: whether the machine is a value of the caller, of no file. Else as in
-    `run.run`. Raises InputError.
+    machine, mesh: those of the job. own_machine: whether the machine is a value of the caller, of no file. left_first:
+    as of `Attempt`. Else as in `run.run`. Raises InputError.
     """
     specification = job_specification(
         job, machine, mesh, lambda: made_toolpath(job, machine, mesh, runner, piece, before), own_machine=own_machine
@@ -64,7 +66,7 @@ def planned(
         specification = dataclasses.replace(specification, setups=max(specification.setups, 2))
     left_out = () if before is None else before.made_from.left_out
     task = Task(job, specification, runner, piece, (*timing_limits(job, machine), *limits), claims, before, left_out)
-    attempt = Attempt(task, mesh, staging, writers)
+    attempt = Attempt(task, mesh, staging, writers, left_first)
     alone = piece is None and before is None and job.placement.setups == 1
     if alone and covers_region(job):
         return attempt, first_that_passes(attempt)
@@ -78,12 +80,16 @@ def planned(
 def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried], options: AdviceOptions) -> Outcome:
     """Search for changes with which a refused job is planned, and return the outcome whose refusal holds them.
 
-    again: plans a job and returns how that ends, as `run.tried`.
+    again: plans a job and returns how that ends, as `run.tried`. Where too much was left in the run, plans look first
+    for what their toolpath leaves.
     """
     refusal, task, runner = outcome.refusal, attempt.task, attempt.runner
     if refusal is None or refusal.stage in FILES:  # a way is refused by the machine's file, not by the job
         return outcome
     failed = failures(outcome.verdict) if refusal.stage == STAGE else {}
+    otherwise = outcome.find(FailedWay)
+    claims = frozenset[str]() if otherwise is None else otherwise.claims
+    again = partial(again, left_first=SURFACE_LEFT in failed or SURFACE_LEFT in claims)
 
     def tried(job: Job, progress: Progress) -> Tried:
         if job.with_(tolerance={"left_share": task.job.tolerance.left_share}).tables != task.job.tables:
@@ -106,13 +112,11 @@ def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried],
 
     search = (task.job, task.machine, attempt.mesh, task.toolpath, tried, options, runner.progress)
     forbidden = refusal.stage == FORBIDDEN
-    otherwise = outcome.find(FailedWay)
-    own = frozenset[str]() if otherwise is None else otherwise.claims
     ways = [stage.value for stage in runner.stages if isinstance(stage.value, FailedWay)]
     lefts = [stage.value.left for stage in runner.stages if isinstance(stage.value, FailedWay | FailedMend)]
     left = min((each for each in lefts if each is not None), default=None)
     meets = next((way.meets for way in ways if way.meets), ())
-    about = (failed, refusal.diagnosis, own, left, meets)
+    about = (failed, refusal.diagnosis, claims, left, meets)
     mended = any(isinstance(stage.value, FailedMend) for stage in runner.stages)  # then it is known what is left
     leaves = None if mended else more_left_out(task.job, task.toolpath, outcome, options.little / options.more)
     found = runner.run("advice", lambda: advised(*search, *about, forbidden=forbidden, leaves=leaves))
