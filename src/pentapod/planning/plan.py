@@ -125,10 +125,8 @@ def plan(
             return planned(np.arange(len(toolpath)))
         return placed
 
-    if (
-        start is not None
-        and (again := _as_planned(toolpath, _beside(whole, start), start, limit, progress)) is not None
-    ):
+    again = None if start is None else _as_planned(toolpath, _beside(whole, start), start, limit, progress)
+    if again is not None:
         return again
     return planned(samples.shaping(toolpath.starts))
 

@@ -1,8 +1,8 @@
 """Leans along a path alone: where no tilt field keeps the limits, or as a plan of nearly the same path has them.
 
 A tilt field is smooth over the part: neighbouring passes lean alike. Where that is not enough, leans may follow the
-path alone, as `AxisSpline` has them. It begins at each waypoint's own best lean where the field falls short. Where no
-lean within the field's cone keeps the limits, as between two walls, wider cones are tried.
+path alone, as `AxisSpline` has them. It begins with leans of a grid that keep the limits and turn evenly. Where no lean
+within the field's cone keeps them, as between two walls, wider cones are tried.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ ENOUGH = NEEDED_MARGIN + 2.0 * SMOOTHING.slack
 
 @dataclass(frozen=True, eq=False)
 class OwnLeans:
-    """The waypoints `rows` (n,) at which a candidate's tilt field does not keep the needed margin.
+    """The waypoints `rows` (n,) at which a candidate's tilt field does not keep the needed margin, with some spare.
 
     field (N, 3): the leans of that field at all waypoints. margins (n, M), leans (n, 3): at each waypoint's best tilt
     of a grid over the cone.
@@ -108,7 +108,7 @@ class OwnLeans:
         return found
 
     def along_path(self, progress: Progress = silent) -> Floats | None:
-        """Return the leans (N, 3) of the smoothest spline that was found to keep the needed margin; None without."""
+        """Return the leans (N, 3) of a smooth spline that was found to keep the needed margin; None without."""
         if not self.fit or self.problem.samples.tilt == 0.0:
             return None
         return _along(self.problem, self.at, OPTIONS.spare * ENOUGH, self._evenly(), progress)
