@@ -103,12 +103,11 @@ def plan(
         best = found.best
         everywhere = problem.at_all(samples)
         if best.smallest < NEEDED_MARGIN:
-            tried: list[OwnLeans] = []
-            for own in OwnLeans.of(everywhere, best).and_wider(toolpath.axes, limit):
-                if (along := own.along_path(progress)) is not None:
-                    return _path(toolpath, own.problem, best, along, found.choice)
-                tried.append(own)
-            return _refusal(toolpath, min(tried, key=lambda own: len(own.unfit) or len(toolpath)))
+            own = OwnLeans.of(everywhere, best).in_best_cone(toolpath.axes, limit)
+            along = own.along_path(progress)
+            if along is None:
+                return _refusal(toolpath, own)
+            return _path(toolpath, own.problem, best, along, found.choice)
         keep = max(KEPT_SHARE * best.smallest, NEEDED_MARGIN)
         if secondary_objective is not None and (constraints.moves or problem.samples.tilt > 0.0):
             progress("placement", 1.0, f"margin {best.smallest:.3f}; now the objective {secondary_objective}")

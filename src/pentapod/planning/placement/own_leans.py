@@ -7,9 +7,9 @@ within the field's cone keeps them, as between two walls, wider cones are tried.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -61,6 +61,13 @@ ENOUGH = NEEDED_MARGIN + 2.0 * SMOOTHING.slack
 """Margin that a spline is asked to keep, so that it has the needed one."""
 
 
+class EvenLeans(NamedTuple):
+    """Leans (N, 3), and the smallest margin of the spline through them."""
+
+    leans: Floats
+    smallest: float
+
+
 @dataclass(frozen=True, eq=False)
 class OwnLeans:
     """The waypoints `rows` (n,) at which a candidate's tilt field does not keep the needed margin, with some spare.
@@ -83,12 +90,21 @@ class OwnLeans:
         rows = np.flatnonzero(problem.values_of(at.margins, at.transform, field).min(axis=1) < OPTIONS.spare * ENOUGH)
         return cls(problem, at, field, rows, *_best_tilted(problem.samples.at(rows), at))
 
-    def and_wider(self, own: Floats, limit: float) -> Iterator[OwnLeans]:
-        """Yield these own leans, and those in wider cones. own, limit: as for `in_cones`."""
-        yield self
-        for wide in in_cones(self.problem, own, limit)[1:]:
+    def in_best_cone(self, own: Floats, limit: float) -> OwnLeans:
+        """Return these own leans, or those in a wider cone: the first one in which leans are found that turn evenly.
+
+        Else the one in which their spline is nearest to keep the margin, or in which the fewest waypoints do not fit.
+        own, limit: as for `in_cones`.
+        """
+        tried, wider = [self], in_cones(self.problem, own, limit)[1:]
+        if not wider:
+            return self
+        for wide in wider:
+            if tried[-1].fit and tried[-1].even.smallest >= OPTIONS.spare * ENOUGH:
+                return tried[-1]
             margins, leans = _best_tilted(wide.samples.at(self.rows), self.at)
-            yield replace(self, problem=wide, margins=margins, leans=leans)
+            tried.append(replace(self, problem=wide, margins=margins, leans=leans))
+        return max(tried, key=lambda each: (-len(each.unfit), each.even.smallest if each.fit else 0.0))
 
     @cached_property
     def fit(self) -> bool:
@@ -111,19 +127,20 @@ class OwnLeans:
         """Return the leans (N, 3) of a smooth spline that was found to keep the needed margin; None without."""
         if not self.fit or self.problem.samples.tilt == 0.0:
             return None
-        return _along(self.problem, self.at, OPTIONS.spare * ENOUGH, self._evenly(), progress)
+        return _along(self.problem, self.at, OPTIONS.spare * ENOUGH, self.even.leans, progress)
 
-    def _evenly(self) -> Floats:
-        """Return leans (N, 3) that turn evenly along the path, and of which a spline is nearest to keep the margin."""
+    @cached_property
+    def even(self) -> EvenLeans:
+        """The leans that turn evenly along the path, and whose spline is nearest to keep the margin."""
         problem, places = self.problem, stations_of(self.problem.samples)
         choice = LeanChoice.of(problem, self.at, self.field, self.rows, places)
         spline = AxisSpline.of(problem.samples, problem.cone)
-        best, most, wanted = self.field, -np.inf, np.full(len(places), OPTIONS.roomy * NEEDED_MARGIN)
+        best, wanted = EvenLeans(self.field, -np.inf), np.full(len(places), OPTIONS.roomy * NEEDED_MARGIN)
         for _ in range(OPTIONS.rounds):
             leans = choice.leans(wanted)
             values = self._values(spline.leans(spline.fitted(leans)))
-            if (smallest := float(values.min())) > most:
-                best, most = leans, smallest
+            if (smallest := float(values.min())) > best.smallest:
+                best = EvenLeans(leans, smallest)
             short = np.flatnonzero(values < OPTIONS.spare * ENOUGH)
             if not len(short):
                 break
