@@ -8,7 +8,8 @@ import pytest
 from trimesh.convex import convex_hull
 
 import concave_parts
-from pentapod.base.errors import MeshError, ProgramError
+import toolpath_surfaces as surfaces
+from pentapod.base.errors import MeshError, ProgramError, ToolpathError
 from pentapod.base.progress import silent
 from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.cli.commands.new import dome_stl
@@ -44,6 +45,7 @@ from pentapod.program import read_header, write_csv
 from pentapod.toolpath import SegmentKind
 from pentapod.toolpath.gouge.report import GougeReport
 from pentapod.toolpath.surfaces.tip_surface import TipSurface
+from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify import Verdict
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
 from pentapod.verify.verdict.verdict import Certificate, Place
@@ -497,3 +499,17 @@ def test_a_ball_that_leaves_a_little_too_much_comes_nearer(tmp_path):
     assert done.passed
     assert any("0.5 times as far apart as asked" in stage.remark for stage in done.stages)
     assert judge(job, tmp_path / "out").passed
+
+
+def test_a_bull_end_that_cuts_nowhere_along_the_normals_stands_upright(tmp_path):
+    """In a trough its flat bottom would cut into both sides: that was an error, without another attempt."""
+    vertices, faces = surfaces.grid(lambda x, y: -np.sqrt(64e-6 - y**2), cells=24, width=0.012)
+    (tmp_path / "part.stl").write_bytes(write_stl(1e3 * vertices[faces], "trough"))
+    tool = {"type": "bull", "diameter_mm": 8.0, "corner_mm": 1.0}
+    job = Job.from_dict({**TABLES, "tool": tool, "toolpath": {"stepover_mm": 2.0}, "axis": {"mode": "auto"}}, tmp_path)
+    with pytest.raises(ToolpathError, match="no cut is left"):
+        job_toolpath(job, job_mesh(job))
+    done = run(job, tmp_path / "out", advice=None)
+    assert any("the tool keeps one direction" in stage.remark for stage in done.stages)
+    assert done.find(Toolpath) is not None
+    assert "no cut is left" not in str(done.refusal)

@@ -198,3 +198,14 @@ def test_hollows_of_an_egg_crate_are_machined(monkeypatch):
     assert most() < 1.25 * ridge
     monkeypatch.setattr(registry, "rest_lines", lambda *_: Passes.of([]))
     assert most() > 1.3 * ridge
+
+
+def test_a_facet_folded_onto_what_rises_beside_it_is_passed_over():
+    """No direction is between opposite normals: it once ended with an error about a vector without length."""
+    patch = sheet(flat)
+
+    def folded(part):
+        return np.array([0]), -part.facet_normals[:1]
+
+    lines = rest_lines(patch, along_x(YS, flat), R, STEP, none, folded)
+    assert not len(lines)

@@ -22,7 +22,7 @@ from pentapod.geometry.solids import Cone
 from pentapod.job.build.process import with_process
 from pentapod.job.build.region import RegionReport, covers_region, job_region, kept_axis, region_report
 from pentapod.job.build.tool import job_tool
-from pentapod.job.build.words import in_words_of
+from pentapod.job.build.words import NO_CUT, in_words_of
 from pentapod.job.schema.job import Job
 from pentapod.job.schema.strategies import FILE
 from pentapod.machine.machine import Machine
@@ -170,9 +170,7 @@ def job_toolpath(
     options = gouge_options(job, _remedies(job), None if from_file else job_link_style(job, mesh, toolpath))
     toolpath, gouges = without_gouges(toolpath, tool, mesh, options, within(progress, "toolpath", CHECKED, 1.0))
     if not any(segment.kind is SegmentKind.CUT for segment in toolpath.segments):
-        raise ToolpathError(
-            "no cut is left: cutter, shank or holder would cut into the part everywhere", key="gouge.remedy"
-        )
+        raise ToolpathError("no cut is left: cutter, shank or holder would cut into the part everywhere", key=NO_CUT)
     stem = stem_sentence(job_tool(job, machine))
     reports: list[object] = [*region, report, gouges]
     reports += [f"  note: {stem}"] if stem else []

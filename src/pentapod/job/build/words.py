@@ -6,6 +6,9 @@ from pentapod.base.errors import InputError
 from pentapod.base.units import split_key
 from pentapod.job.schema.job import Job
 
+NO_CUT = "gouge.remedy"
+"""Key of the error about a toolpath all of whose cuts gouge."""
+
 TABLES = ("toolpath", "tolerance", "tool")
 """Tables in which the key of an option is looked for."""
 

@@ -9,6 +9,7 @@ from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress, silent
 from pentapod.job.advice.options import OPTIONS, AdviceOptions
 from pentapod.job.build.values import job_machine, job_mesh
+from pentapod.job.build.words import NO_CUT
 from pentapod.job.pipeline.run import tried
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine
@@ -16,7 +17,7 @@ from pentapod.machine.machine import Machine
 if TYPE_CHECKING:
     from pentapod.job.advice.search import Advised
 
-_KEYS = frozenset(("region", "gouge.remedy", "part.unit", "part.scale", "curve", "toolpath.shallowest_deg"))
+_KEYS = frozenset(("region", NO_CUT, "part.unit", "part.scale", "curve", "toolpath.shallowest_deg"))
 
 
 def can_help(error: InputError) -> bool:

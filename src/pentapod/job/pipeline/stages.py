@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
+from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress
 from pentapod.base.refusal import Refusal
 from pentapod.job.advice.options import AdviceOptions, Tried
@@ -15,14 +16,16 @@ from pentapod.job.advice.search import advised
 from pentapod.job.advice.settings import LEFT_ALONE
 from pentapod.job.build.left import FORBIDDEN
 from pentapod.job.build.limits import timing_limits
+from pentapod.job.build.other_ways import STANDS, STANDS_ON_END, ends, may_stand, standing
 from pentapod.job.build.pieces import job_part
 from pentapod.job.build.region import covers_region
 from pentapod.job.build.specification import job_specification
 from pentapod.job.build.toolpath import job_link_style
+from pentapod.job.build.words import NO_CUT
 from pentapod.job.mending import FailedMend, FailedWay, more_left_out
 from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage
 from pentapod.job.pipeline.attempt import Attempt, Writer, made_toolpath
-from pentapod.job.pipeline.other_attempts import first_that_passes
+from pentapod.job.pipeline.other_attempts import ANOTHER_WAY, first_that_passes
 from pentapod.job.plan_before import PlanBefore
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import StageRunner, ending_when_interrupted
@@ -34,7 +37,7 @@ from pentapod.planning.setups import setups
 from pentapod.timing import Limit
 from pentapod.toolpath import Mesh
 from pentapod.toolpath.linking.partition import Piece, missed_cuts
-from pentapod.verify import Claim
+from pentapod.verify import Claim, Specification
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
 
 
@@ -59,15 +62,25 @@ def planned(
     machine, mesh: those of the job. own_machine: whether the machine is a value of the caller, of no file. left_first:
     as of `Attempt`. Else as in `run.run`. Raises InputError.
     """
-    specification = job_specification(
-        job, machine, mesh, lambda: made_toolpath(job, machine, mesh, runner, piece, before), own_machine=own_machine
-    )
+    alone = piece is None and before is None and job.placement.setups == 1
+
+    def specified(job: Job) -> Specification:
+        make = partial(made_toolpath, job, machine, mesh, runner, piece, before)
+        return job_specification(job, machine, mesh, make, own_machine=own_machine)
+
+    try:
+        specification = specified(job)
+    except InputError as error:
+        if not (alone and may_stand(job) and error.key == NO_CUT):
+            raise
+        runner.stages.append(Stage(ANOTHER_WAY, 0.0, None, STANDS_ON_END if ends(job) else STANDS))
+        job = standing(job)
+        specification = specified(job)
     if piece is not None:  # the caller plans the other pieces elsewhere
         specification = dataclasses.replace(specification, setups=max(specification.setups, 2))
     left_out = () if before is None else before.made_from.left_out
     task = Task(job, specification, runner, piece, (*timing_limits(job, machine), *limits), claims, before, left_out)
     attempt = Attempt(task, mesh, staging, writers, left_first)
-    alone = piece is None and before is None and job.placement.setups == 1
     if alone and covers_region(job):
         return attempt, first_that_passes(attempt)
     outcome = attempt.foreseen(upright=False) or attempt.planned()

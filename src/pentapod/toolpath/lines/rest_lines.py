@@ -128,6 +128,9 @@ def _left(patch: Patch, rising: Rising, tree: KDTree, radius: float, height: flo
         np.maximum.at(left, b, more)
     # The half of an arc that is nearer to what rises beyond the patch is not under it.
     sides, beyond = rising
+    # A facet may be folded onto what rises there: no direction is between them.
+    apart = np.einsum("ij,ij->i", normals[sides // 3], beyond) > np.cos(options.folded)
+    sides, beyond = sides[apart], beyond[apart]
     ends = patch.vertices[patch.side_ends(sides)].mean(axis=1)
     for share in (0.25, 0.5):
         between = normalised((1.0 - share) * normals[sides // 3] + share * beyond)
