@@ -249,7 +249,7 @@ def test_advice_gets_what_another_way_left_and_at_which_heights_the_tool_met_the
     runner.stages = [*refused.stages, *(Stage(ANOTHER_WAY, 0.0, way) for way in ways)]
     task = SimpleNamespace(job=job, machine=refused.machine, toolpath=None)
     attempt = SimpleNamespace(task=task, runner=runner, mesh=None, refused=lambda refusal: refusal)
-    with_advice(attempt, replace(refused, stages=tuple(runner.stages)), None, OPTIONS)
+    with_advice(attempt, replace(refused, stages=tuple(runner.stages)), run, OPTIONS)
     assert told == [(min(first, 0.2), (1.0, 2.0))]
 
 
