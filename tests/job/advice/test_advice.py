@@ -202,6 +202,33 @@ def test_where_its_program_leaves_too_much_set_ups_and_other_tool_lengths_are_no
 
 
 @pytest.mark.usefixtures("all_fits")
+@pytest.mark.parametrize(("percent", "share"), [(3.0, 0.036), (8.5, None)])
+def test_more_than_a_little_that_is_left_may_stay_where_nothing_else_was_found(percent, share, tmp_path):
+    """It keeps most of the area; it costs no plan, and is not one of those that may be made."""
+
+    def plan(job: Job, _) -> Tried:
+        planned.append(job.tolerance.left_share)
+        passes = share is not None and job.tolerance.left_share == share
+        return Tried(None if passes else "verdict", failed=frozenset((SURFACE_LEFT,)))
+
+    planned: list[float] = []
+    job = Job.load(REFUSED["dome of 60 deg, no cone"].write(tmp_path))
+    machine, mesh = job_machine(job), job_mesh(job)
+    toolpath = job_toolpath(job, mesh, machine=machine)[0]
+    failed = {SURFACE_LEFT: Certificate(SURFACE_LEFT, False, percent, 0.1, "%", Place(), "")}
+    options = AdviceOptions(nearer=(), thinner=0.99, surface_points=2000)
+    found = advised(job, machine, mesh, toolpath, plan, options, silent, failed=failed)
+    if share is None:
+        assert not found.advice
+        assert set(planned) == {job.tolerance.left_share}
+    else:
+        (advice,) = found.advice
+        assert advice.kept == pytest.approx(1.0 - share)
+        assert planned[-1] == share
+        assert len(planned) <= options.replans + 1
+
+
+@pytest.mark.usefixtures("all_fits")
 @pytest.mark.parametrize(("failed", "there"), [("component kept", 1), ("tip deviation", 2)])
 def test_another_place_is_tried_next_where_a_program_is_near_a_singular_surface(failed, there, tmp_path):
     """Other tool axes hardly help there; for other claims a second one is tried at the same place."""

@@ -75,6 +75,11 @@ class FailedClaims:
         if self.leaves is not None:
             yield self._staying(_longer(self.options.more * self.leaves))
 
+    def at_last(self) -> Iterator[Trial]:
+        """Yield the program as it is where nothing else was found, and more than a little is left."""
+        if self.options.little < self._accepted <= self.options.largest:
+            yield self._staying(self._accepted)
+
     def upright(self) -> Iterator[Trial]:
         """Yield the job without what a ball reaches only under an overhang, where the tool touches the part."""
         if getattr(self.job.toolpath, "under_mm", 0.0) == 0.0 or not isinstance(self._tool, BallEnded):

@@ -51,8 +51,8 @@ class AdviceOptions(Value):
     left; near_share: steps along the toolpath, in radii of the ball; surely: share of what may be left that the
     estimate must keep to; little: share of the region that may stay as it is, where nothing else helps; hardly: that
     may before anything else is planned; long: waypoints from which other ways take minutes, so that `little` may
-    before; more: what is allowed then, as a multiple of what is left; about: up to this multiple of what another way
-    leaves, the program as it is counts.
+    before; largest: that may where nothing else was found; more: what is allowed then, as a multiple of what is left;
+    about: up to this multiple of what another way leaves, the program as it is counts.
     """
 
     wanted: int = 1
@@ -96,6 +96,7 @@ class AdviceOptions(Value):
     surely: float = 0.8
     hardly: float = 0.005
     little: float = 0.02
+    largest: float = 0.1
     long: int = 10_000
     more: float = 1.2
     about: float = 2.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, islice
@@ -113,15 +113,16 @@ def advised(
         meets=met_below(job, toolpath, short, options) or meets,
     )  # fmt: skip
     trials = _trials(job, machine, mesh, toolpath, options, tell, own, partial(Trials, because=because, ended=last))
+    at_last: Iterable[Trial] = ()
     if toolpath is not None:
         claims = FailedClaims(job, machine, mesh, toolpath, failed, options, tell, left, leaves)
         touches = any(each.constraint.startswith(TOUCHES) for each in short)
         # Where it may, a run has planned an upright tool by itself.
         upright = touches and not may_stand(job)
         first = claims.upright() if upright else claims.reaching() if forbidden else ()
-        trials = chain(first, claims.all(), trials)
+        trials, at_last = chain(first, claims.all(), trials), claims.at_last()
     try:
-        for number, trial in enumerate(islice(trials, count)):
+        for number, trial in enumerate(chain(islice(trials, count), at_last)):
             tried[trial.words] = None
             ended.append(plan := _ended(planned, job, trial, partial(shown.plan, number, trial.words)))
             shown.number = number + 1
@@ -164,7 +165,7 @@ class _Shown:
         )
 
     def _tell(self, share: float, words: str) -> None:
-        self.reached = max(self.reached, (self.number + share) / self.count)
+        self.reached = max(self.reached, min((self.number + share) / self.count, 1.0))
         self.progress("advice", self.reached, words)
 
 
