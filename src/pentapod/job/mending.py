@@ -21,15 +21,13 @@ from pentapod.geometry.runs import marked_runs
 from pentapod.job.advice.options import OPTIONS as ADVICE
 from pentapod.job.advice.settings import TOUCHES, met_below
 from pentapod.job.build.other_ways import (
-    STANDS,
-    STANDS_ON_END,
     ends,
+    made_upright,
     may_come_nearer,
     may_stand,
     nearer,
     nearer_share,
     nearer_words,
-    standing,
     stepover_share,
 )
 from pentapod.job.build.region import covers_region
@@ -180,7 +178,7 @@ def other_way(
     limits = [each.constraint for each in outcome.refusal.diagnosis]
     touches = any(name.startswith(TOUCHES) for name in (*limits, *failed))
     if may_stand(job) and (touches or ends(job)):
-        return standing(job), STANDS_ON_END if ends(job) else STANDS
+        return made_upright(job)
     share = nearer_share(job)
     if share is None or outcome.refusal.stage != STAGE or set(failed) != {SURFACE_LEFT}:
         return None

@@ -101,6 +101,14 @@ def test_a_little_that_another_way_leaves_may_stay(tmp_path, claim, percent):
     assert shares == [0.0017]
 
 
+@pytest.mark.parametrize(("own", "other", "share"), [(0.2037, 0.1709, 0.0025), (5.0, 0.5, 0.006)])
+def test_what_may_stay_is_what_the_program_leaves_unless_another_way_leaves_much_less(tmp_path, own, other, share):
+    job = Job.load(REFUSED["passes too far apart"].write(tmp_path))
+    _, found, _ = trials_of(job, surface_left.CLAIMS[0], own, left=other, nearer=(), thinner=0.99)
+    shares = [each.changes["tolerance"]["left_share"] for each in found if "left_share" in each.changes["tolerance"]]
+    assert shares == [share]
+
+
 @pytest.mark.parametrize(("percent", "also"), [(1.7, ()), (0.2, slowness.CLAIMS)])
 def test_much_that_is_left_may_not_stay_nor_a_little_beside_other_faults(tmp_path, percent, also):
     name, given = "passes too far apart", {"nearer": (), "thinner": 0.99}

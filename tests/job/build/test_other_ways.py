@@ -45,7 +45,6 @@ from pentapod.program import read_header, write_csv
 from pentapod.toolpath import SegmentKind
 from pentapod.toolpath.gouge.report import GougeReport
 from pentapod.toolpath.surfaces.tip_surface import TipSurface
-from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify import Verdict
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
 from pentapod.verify.verdict.verdict import Certificate, Place
@@ -251,6 +250,31 @@ def test_advice_gets_what_another_way_left_and_at_which_heights_the_tool_met_the
     attempt = SimpleNamespace(task=task, runner=runner, mesh=None, refused=lambda refusal: refusal)
     with_advice(attempt, replace(refused, stages=tuple(runner.stages)), run, OPTIONS)
     assert told == [(min(first, 0.2), (1.0, 2.0))]
+
+
+def test_what_may_be_left_is_judged_on_the_program_only_if_that_leaves_no_more(job, monkeypatch):
+    """Else the job is planned: another way to do it leaves less than this program."""
+
+    def advised(*given, **_):
+        planned.append(given[4])
+        return SimpleNamespace(advice=(), sentence="nothing")
+
+    def again(job, _, *, left_first):
+        return "again", job.tolerance.left_share, left_first
+
+    planned = []
+    monkeypatch.setattr("pentapod.job.pipeline.stages.advised", advised)
+    refused, runner = failing(job, SURFACE_LEFT, left=0.3), StageRunner(silent)
+    runner.stages = list(refused.stages)
+    task = SimpleNamespace(job=job, machine=refused.machine, toolpath=None)
+    attempt = SimpleNamespace(
+        task=task, runner=runner, mesh=None, ended=lambda _: None, tried_with=lambda share, _: ("judged", share)
+    )
+    monkeypatch.setattr("pentapod.job.pipeline.stages.more_left_out", lambda *_: None)
+    with_advice(attempt, refused, again, OPTIONS)
+    (plan,) = planned
+    assert plan(job.with_(tolerance={"left_share": 0.004}), silent) == ("judged", 0.004)
+    assert plan(job.with_(tolerance={"left_share": 0.002}), silent) == ("again", 0.002, True)
 
 
 @pytest.mark.parametrize(("second", "expected"), [((SURFACE_LEFT,), "second"), ((), "first")])
@@ -510,6 +534,9 @@ def test_a_bull_end_that_cuts_nowhere_along_the_normals_stands_upright(tmp_path)
     with pytest.raises(ToolpathError, match="no cut is left"):
         job_toolpath(job, job_mesh(job))
     done = run(job, tmp_path / "out", advice=None)
-    assert any("the tool keeps one direction" in stage.remark for stage in done.stages)
-    assert done.find(Toolpath) is not None
-    assert "no cut is left" not in str(done.refusal)
+    assert done.passed
+    assert done.job == job
+    remarks = {stage.name: stage.remark for stage in done.stages}
+    assert "the tool keeps one direction" in remarks["another way"]
+    assert "surface left on the region" in remarks["left"]
+    assert judge(job, tmp_path / "out").passed  # as the header of its program says

@@ -9,19 +9,24 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from pentapod.base.progress import silent
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.planning import PlacedPath, PlacementConstraints, plan
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.placement import own_leans
-from pentapod.planning.placement.own_leans import OwnLeans
+from pentapod.planning.placement.lean_choice import LeanChoice
+from pentapod.planning.placement.own_leans import OwnLeans, in_cones
 from pentapod.planning.placement.placed_path import UnplacedPath
+from pentapod.planning.placement.sampling import best_tilted_margins
+from pentapod.planning.problem.common_axis import CommonAxis
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
+from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.problem.weights import NEEDED_MARGIN
 from pentapod.planning.tool_axis.smoothing import OPTIONS as SMOOTHING
 from pentapod.planning.tool_axis.smoothing import _Smoothing, smoothed
-from pentapod.planning.tool_axis.spline import AxisSpline
+from pentapod.planning.tool_axis.spline import AxisSpline, stations_of
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 TILT = np.radians(20.0)
@@ -204,19 +209,84 @@ def leaning(path: Toolpath, degrees: float) -> Toolpath:
     return replace(path, segments=segments)
 
 
-@pytest.mark.parametrize("degrees", [0.0, 78.0])
-def test_leans_that_no_cone_of_the_field_holds_are_found_within_the_limit(degrees, desk, here):
-    """The axis has to lean by 24 deg, and a field holds 15; own axes of 78 deg leave it 12 of the limit of 90."""
-    path = leaning(zigzag(), degrees)
+@pytest.fixture
+def walls(desk, here):
+    """A path with own axes of 78 deg, and what `plan` is asked for: the axis has to sway by 24 deg."""
     sway = Sway(float(here.translation[1]), 0.03, 0.08, height=0.4)
     upright = replace(PlacementConstraints.fixture([here]), upright=np.eye(3)[2], normal=-np.eye(3)[2])
     asked = {"common_axis": True, "constraints": upright, "limits": (LimitKind(lambda _: [sway]),)}
-    placed = plan(path, desk, tilt=np.radians(90.0), **asked)
+    return leaning(zigzag(), 78.0), asked
+
+
+def test_a_path_that_was_planned_with_wide_leans_keeps_them(desk, walls, monkeypatch):
+    path, asked = walls
+    whole = plan(path, desk, tilt=np.radians(90.0), **asked)
+    monkeypatch.delattr(importlib.import_module("pentapod.planning.plan"), "improved_from")  # nothing is searched for
+    cut = path.segments[0]
+    rest = Toolpath((replace(cut, tips=cut.tips[40:], axes=cut.axes[40:]),), path.tilt_centre)
+    again = plan(rest, desk, tilt=np.radians(90.0), start=whole, **asked)
+    assert again.smallest_margin >= NEEDED_MARGIN
+    assert np.ptp(again.axes[:, 0]) > 0.6
+
+
+@pytest.fixture
+def beyond(desk, here, walls):
+    """A smoothing that begins with leans to one side alone, which are 79 deg from the own axes, where 78.5 may be.
+
+    The tip stays where it is, so that leans along y gain nothing else.
+    """
+    (path, asked), limit = walls, np.radians(78.5)
+    path = replace(path, tilt_centre=0.0)
+    samples = ToolpathSamples.of(path, np.radians(15.0)).towards(CommonAxis(np.eye(3)[2], 0.0, limit))
+    problem = PlacementProblem.of(samples, desk, asked["constraints"], limits=asked["limits"])
+    wide = in_cones(problem, path.axes, limit)[-1]
+    turn = 2.0 * np.pi * wide.samples.machine_poses(here, path.axes)[0][:, 1] / 0.03
+    leans = np.c_[0.4 * np.sin(turn - 2.0 * np.pi * here.translation[1] / 0.03), np.zeros((len(turn), 2))]
+    start = wide.candidate(wide.margins[0], here, wide.upright)
+    return wide, start, leans
+
+
+def test_leans_beyond_the_limit_of_the_axes_come_inside(beyond):
+    problem, start, leans = beyond
+    assert problem.samples.inside(lean(problem.samples.nominal, leans)).min() < -1e-3
+    found = smoothed(problem, start, 0.1, leans=leans)
+    assert found is not None
+    axes = lean(problem.samples.nominal, AxisSpline.of(problem.samples, problem.cone).leans(found))
+    assert problem.samples.inside(axes).min() >= -SMOOTHING.slack
+    assert smallest(problem, start, found) >= 0.1 - SMOOTHING.slack
+
+
+def test_no_lean_of_a_grid_beyond_the_limit_of_the_axes_is_chosen(beyond):
+    problem, start, leans = beyond
+    samples, rows = problem.samples, np.arange(0, 360, 30)
+    choice = LeanChoice.of(problem, start, np.zeros_like(leans), rows, stations_of(samples))
+    outside = samples.inside(lean(samples.nominal[choice.chosen], choice.grid), choice.chosen) < 0.0
+    assert 0.2 < outside.mean() < 0.8
+    np.testing.assert_array_equal(np.isneginf(choice.smallest), outside)
+    _, best = best_tilted_margins(samples, start.margins, start.transform)
+    assert samples.inside(lean(samples.nominal, best)).min() >= 0.0
+
+
+def test_the_limit_of_the_axes_does_not_follow_the_margin_that_is_aimed_at(beyond):
+    problem, start, leans = beyond
+    run = _Smoothing(problem, start, 0.1, SMOOTHING, silent, leans)
+    run.aim(0.3)
+    np.testing.assert_allclose(run.margins, run.values(run.c, run.rows))
+
+
+@pytest.mark.parametrize(("degrees", "limit"), [(0.0, 90.0), (78.0, 90.0), (78.0, 78.5)])
+def test_leans_that_no_cone_of_the_field_holds_are_found_within_the_limit(degrees, limit, desk, walls):
+    """The axis has to lean by 24 deg, and a field holds 15; own axes of 78 deg leave it 12 of the limit of 90.
+
+    To one side alone it would be 79 deg from these: with the last limit it has to lean towards them, too.
+    """
+    path, (_, asked) = leaning(zigzag(), degrees), walls
+    placed = plan(path, desk, tilt=np.radians(limit), **asked)
     assert isinstance(placed, PlacedPath), str(placed)
     assert placed.margins.min() >= NEEDED_MARGIN
     assert np.ptp(placed.axes[:, 0]) > 0.6
     leant = angle_between(placed.placement.transform.inverse().rotate(placed.axes), path.axes)
-    assert leant.max() < np.radians(90.0)
+    assert leant.max() < np.radians(limit) + SMOOTHING.slack
     # Beyond the limit nothing is tried.
     refused = plan(path, desk, tilt=np.radians(18.0), **asked)
     assert isinstance(refused, UnplacedPath)

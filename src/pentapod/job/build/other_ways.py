@@ -74,6 +74,11 @@ def standing(job: Job) -> Job:
     return replace(made, asked=job.asked or job, from_file=job.from_file)
 
 
+def made_upright(job: Job) -> tuple[Job, str]:
+    """Return the job that an upright tool does, and what is said of it."""
+    return standing(job), STANDS_ON_END if ends(job) else STANDS
+
+
 def stands(job: Job) -> bool:
     """Return whether a job is one that an upright tool does, though it was asked for with a tool that leans."""
     return job.asked is not None and job.axis.mode != job.asked.axis.mode

@@ -21,6 +21,9 @@ from pentapod.planning.placement.placed_path import UnplacedPath
 from pentapod.toolpath import Toolpath
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
 
+LEFT = "left"
+"""Name of the stage that says what an upright tool does not reach."""
+
 ANOTHER_WAY = "another way"
 """Name of the stage that says in which other way a job is done."""
 
@@ -125,10 +128,7 @@ def _otherwise(attempt: Attempt, failed: Outcome, job: Job, words: str, before: 
     last = failed if SURFACE_LEFT in failures(failed.verdict) else before
     if not outcome.passed and (other := other_way(job, outcome, last)) is not None:
         outcome = _otherwise(again, outcome, *other, last)
-    elif outcome.passed and stands(job):  # what it does not reach
-        left = next(each.method for each in outcome.verdict.certificates if each.claim == SURFACE_LEFT)
-        runner.stages.append(Stage("left", 0.0, None, f"{SURFACE_LEFT}: {left.rsplit('; ', 1)[-1]}"))
-        outcome = again.ended(outcome.verdict)
+    outcome = with_what_is_left(again, outcome)
     if outcome.passed:
         attempt.runner.stages = runner.stages
         return outcome
@@ -137,6 +137,15 @@ def _otherwise(attempt: Attempt, failed: Outcome, job: Job, words: str, before: 
         *(stage for stage in runner.stages if isinstance(stage.value, FailedWay | FailedMend)),
     ]
     return attempt.put_back(failed, program)
+
+
+def with_what_is_left(attempt: Attempt, outcome: Outcome) -> Outcome:
+    """Return an outcome; where an upright tool did the job, with a stage that says what it does not reach."""
+    if not (outcome.passed and stands(attempt.task.job)) or any(stage.name == LEFT for stage in attempt.runner.stages):
+        return outcome
+    left = next(each.method for each in outcome.verdict.certificates if each.claim == SURFACE_LEFT)
+    attempt.runner.stages.append(Stage(LEFT, 0.0, None, f"{SURFACE_LEFT}: {left.rsplit('; ', 1)[-1]}"))
+    return attempt.ended(outcome.verdict)
 
 
 def _planned(attempt: Attempt, start: PlacedPath | None) -> Outcome:

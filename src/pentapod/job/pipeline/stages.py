@@ -16,7 +16,7 @@ from pentapod.job.advice.search import advised
 from pentapod.job.advice.settings import LEFT_ALONE
 from pentapod.job.build.left import FORBIDDEN
 from pentapod.job.build.limits import timing_limits
-from pentapod.job.build.other_ways import STANDS, STANDS_ON_END, ends, may_stand, standing
+from pentapod.job.build.other_ways import made_upright, may_stand
 from pentapod.job.build.pieces import job_part
 from pentapod.job.build.region import covers_region
 from pentapod.job.build.specification import job_specification
@@ -25,7 +25,7 @@ from pentapod.job.build.words import NO_CUT
 from pentapod.job.mending import FailedMend, FailedWay, more_left_out
 from pentapod.job.outcome import Outcome, SetUp, SetUps, Stage
 from pentapod.job.pipeline.attempt import Attempt, Writer, made_toolpath
-from pentapod.job.pipeline.other_attempts import ANOTHER_WAY, first_that_passes
+from pentapod.job.pipeline.other_attempts import ANOTHER_WAY, first_that_passes, with_what_is_left
 from pentapod.job.plan_before import PlanBefore
 from pentapod.job.schema.job import Job
 from pentapod.job.stage_runner import StageRunner, ending_when_interrupted
@@ -62,7 +62,7 @@ def planned(
     machine, mesh: those of the job. own_machine: whether the machine is a value of the caller, of no file. left_first:
     as of `Attempt`. Else as in `run.run`. Raises InputError.
     """
-    alone = piece is None and before is None and job.placement.setups == 1
+    alone, asked = piece is None and before is None and job.placement.setups == 1, job
 
     def specified(job: Job) -> Specification:
         make = partial(made_toolpath, job, machine, mesh, runner, piece, before)
@@ -73,8 +73,8 @@ def planned(
     except InputError as error:
         if not (alone and may_stand(job) and error.key == NO_CUT):
             raise
-        runner.stages.append(Stage(ANOTHER_WAY, 0.0, None, STANDS_ON_END if ends(job) else STANDS))
-        job = standing(job)
+        job, words = made_upright(job)
+        runner.stages.append(Stage(ANOTHER_WAY, 0.0, None, words))
         specification = specified(job)
     if piece is not None:  # the caller plans the other pieces elsewhere
         specification = dataclasses.replace(specification, setups=max(specification.setups, 2))
@@ -82,7 +82,8 @@ def planned(
     task = Task(job, specification, runner, piece, (*timing_limits(job, machine), *limits), claims, before, left_out)
     attempt = Attempt(task, mesh, staging, writers, left_first)
     if alone and covers_region(job):
-        return attempt, first_that_passes(attempt)
+        outcome = with_what_is_left(attempt, first_that_passes(attempt))
+        return attempt if job is asked else attempt.with_task(job=asked), outcome  # advice is about the job as asked
     outcome = attempt.foreseen(upright=False) or attempt.planned()
     refusal = outcome.refusal
     if refusal is not None and refusal.stage == "placement" and piece is None and job.placement.setups > 1:

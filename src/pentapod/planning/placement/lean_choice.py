@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.planning.placement.sampling import tilted_margins
+from pentapod.numerics.blocks import blocks
+from pentapod.planning.placement.sampling import tilted
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.problem.tilt_field import lean
 
@@ -55,15 +56,15 @@ class LeanChoice:
         """Return the choice around waypoints `rows`."""
         ahead = np.searchsorted(stations[rows], stations + options.reach, side="right")
         chosen = np.flatnonzero(np.searchsorted(stations[rows], stations - options.reach) < ahead)
-        own = problem.values_of(at.margins, at.transform, field[chosen], chosen).min(axis=1)
-        grids, smallest = [field[chosen][None]], [own[None]]
-        parts = [
-            (leans, margins.min(axis=-1))
-            for leans, margins in tilted_margins(problem.samples.at(chosen), at.margins, at.transform, options.rings)
-        ]
-        grids.append(np.concatenate([leans for leans, _ in parts], axis=1))
-        smallest.append(np.concatenate([margins for _, margins in parts], axis=1))
-        return cls(problem, field, chosen, np.concatenate(grids), np.concatenate(smallest), stations, options)
+        leans = np.concatenate([field[None, chosen], tilted(problem.samples, chosen, options.rings)])
+        smallest = np.empty(leans.shape[:2])
+        for part in blocks(len(chosen)):
+            rows = chosen[part]
+            smallest[:, part] = problem.values_of(at.margins, at.transform, leans[:, part], rows).min(axis=-1)
+            inside = problem.samples.inside(lean(problem.samples.nominal[rows], leans[:, part]), rows)
+            if inside is not None:
+                smallest[:, part][inside < 0.0] = -np.inf
+        return cls(problem, field, chosen, leans, smallest, stations, options)
 
     def leans(self, wanted: Floats) -> Floats:
         """Return leans (N, 3) that have margins of `wanted` (N,) where they may, and turn evenly.

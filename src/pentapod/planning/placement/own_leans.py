@@ -24,7 +24,7 @@ from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.problem.weights import NEEDED_MARGIN
 from pentapod.planning.tool_axis.smoothing import OPTIONS as SMOOTHING
-from pentapod.planning.tool_axis.smoothing import smoothed
+from pentapod.planning.tool_axis.smoothing import SmoothingOptions, smoothed
 from pentapod.planning.tool_axis.spline import AxisSpline, stations_of
 from pentapod.toolpath.toolpath import Toolpath
 
@@ -38,7 +38,7 @@ class LeansOptions:
     not meet them exactly; more: factor on it near waypoints, up to `beside` metres of path, at which the spline falls
     short. rounds: of this. kept: share of the smallest margin of a plan of nearly the same path that is kept. lever:
     metres that one radian of the path's axis counts for, where the waypoint of that plan is sought. wider_deg: half
-    angles of wider cones. rings: of the grid of tilts, where a waypoint fits with none of a coarser one.
+    angles of wider cones. rings: of the grid of tilts, where a coarser one has no lean that fits.
     """
 
     spare: float = 2.0
@@ -54,11 +54,16 @@ class LeansOptions:
 
 OPTIONS = LeansOptions()
 
-QUICKLY = replace(SMOOTHING, decrease=1e-2, steps=25, enough=0.25)
-"""How leans that turn evenly already are smoothed: more steps change the cycle time by some thousandths."""
+QUICKLY = replace(SMOOTHING, decrease=1e-2, steps=25)
+"""How leans that turn evenly already are smoothed: up to 40 steps changed two cycle times by less than 0.3 %."""
 
 ENOUGH = NEEDED_MARGIN + 2.0 * SMOOTHING.slack
 """Margin that a spline is asked to keep, so that it has the needed one."""
+
+
+def asked() -> float:
+    """Return the margin that leans along a path are asked to keep, with the spare."""
+    return OPTIONS.spare * ENOUGH
 
 
 class EvenLeans(NamedTuple):
@@ -87,7 +92,7 @@ class OwnLeans:
     def of(cls, problem: PlacementProblem, at: Candidate) -> OwnLeans:
         """Return the own leans where a candidate of a problem falls short."""
         field = problem.leans(at.coefficients)
-        rows = np.flatnonzero(problem.values_of(at.margins, at.transform, field).min(axis=1) < OPTIONS.spare * ENOUGH)
+        rows = np.flatnonzero(problem.values_of(at.margins, at.transform, field).min(axis=1) < asked())
         return cls(problem, at, field, rows, *_best_tilted(problem.samples.at(rows), at))
 
     def in_best_cone(self, own: Floats, limit: float) -> OwnLeans:
@@ -100,7 +105,7 @@ class OwnLeans:
         if not wider:
             return self
         for wide in wider:
-            if tried[-1].fit and tried[-1].even.smallest >= OPTIONS.spare * ENOUGH:
+            if tried[-1].fit and tried[-1].even.smallest >= asked() - SMOOTHING.slack:
                 return tried[-1]
             margins, leans = _best_tilted(wide.samples.at(self.rows), self.at)
             tried.append(replace(self, problem=wide, margins=margins, leans=leans))
@@ -113,7 +118,7 @@ class OwnLeans:
 
     @cached_property
     def unfit(self) -> Ints:
-        """The waypoints (k,) that fit with no lean of the grid."""
+        """The waypoints (k,) at which every lean of the grid exceeds a limit."""
         return self.rows[self.margins.min(axis=1) < NEEDED_MARGIN]
 
     @property
@@ -127,7 +132,9 @@ class OwnLeans:
         """Return the leans (N, 3) of a smooth spline that was found to keep the needed margin; None without."""
         if not self.fit or self.problem.samples.tilt == 0.0:
             return None
-        return _along(self.problem, self.at, OPTIONS.spare * ENOUGH, self.even.leans, progress)
+        # What the spline through them keeps is not lost where no smoother one is found.
+        keep = float(np.clip(self.even.smallest, ENOUGH, asked()))
+        return _along(self.problem, self.at, keep, self.even.leans, progress, QUICKLY)
 
     @cached_property
     def even(self) -> EvenLeans:
@@ -141,7 +148,7 @@ class OwnLeans:
             values = self._values(spline.leans(spline.fitted(leans)))
             if (smallest := float(values.min())) > best.smallest:
                 best = EvenLeans(leans, smallest)
-            short = np.flatnonzero(values < OPTIONS.spare * ENOUGH)
+            short = np.flatnonzero(values < asked() - SMOOTHING.slack)
             if not len(short):
                 break
             away = KDTree(places[short, None]).query(places[:, None])[0]
@@ -153,7 +160,7 @@ class OwnLeans:
         problem, samples = self.problem, self.problem.samples
         values = problem.values_of(self.at.margins, self.at.transform, leans).min(axis=1)
         inside = samples.inside(lean(samples.nominal, leans))
-        return values if inside is None else np.minimum(values, OPTIONS.spare * ENOUGH + inside)
+        return values if inside is None else np.minimum(values, asked() + inside)
 
 
 def _best_tilted(samples: ToolpathSamples, at: Candidate) -> tuple[Floats, Floats]:
@@ -203,9 +210,16 @@ def leans_as_planned(
     steepest = np.linalg.norm(leans, axis=1)
     cones = in_cones(problem, path.axes, limit)
     wide = next((each for each in cones if (steepest <= each.longest()).all()), cones[-1])
-    return _along(wide, at, keep, leans, progress)
+    return _along(wide, at, keep, leans, progress, SMOOTHING)
 
 
-def _along(problem: PlacementProblem, at: Candidate, keep: float, leans: Floats, progress: Progress) -> Floats | None:
-    spline = smoothed(problem, at, keep, QUICKLY, progress, leans)
+def _along(
+    problem: PlacementProblem,
+    at: Candidate,
+    keep: float,
+    leans: Floats,
+    progress: Progress,
+    options: SmoothingOptions,
+) -> Floats | None:
+    spline = smoothed(problem, at, keep, options, progress, leans)
     return None if spline is None else AxisSpline.of(problem.samples, problem.cone).leans(spline)

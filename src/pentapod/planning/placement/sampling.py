@@ -157,39 +157,26 @@ def best_tilted_margins(
     gaps: `tool_gaps` of these samples, where they are known. rings: of the grid.
     """
     out, leans = np.empty((len(samples.tilt_centres), len(margins.limits))), np.empty((len(samples.tilt_centres), 3))
-    start = 0
-    for b, all_margins in tilted_margins(samples, margins, placement, rings, gaps, block):
-        rows = np.arange(start, start + b.shape[1])
+    for start in range(0, len(out), block):
+        rows = np.arange(start, min(start + block, len(out)))
+        b = tilted(samples, rows, rings)
+        axes = lean(samples.nominal[rows], b)
+        poses, inside = samples.machine_poses(placement, axes, rows), samples.inside(axes, rows)
+        all_margins = margins(*poses, placement, None if gaps is None else gaps[:, rows])
+        if inside is not None:
+            all_margins[inside < 0.0] = -np.inf
         choice = all_margins.min(axis=-1).argmax(axis=0)
         out[rows] = all_margins[choice, np.arange(len(rows))]
         leans[rows] = b[choice, np.arange(len(rows))]
-        start += len(rows)
     return out, leans
 
 
-def tilted_margins(
-    samples: ToolpathSamples,
-    margins: Margins,
-    placement: RigidTransform,
-    rings: int = 2,
-    gaps: Floats | None = None,
-    block: int = 4096,
-) -> Iterator[tuple[Floats, Floats]]:
-    """Yield leans (K, n, 3) of a grid over the cone, and their margins (K, n, M), block by block of waypoints.
-
-    A margin is -inf where a lean exceeds the limit of the axes. Else as in `best_tilted_margins`.
-    """
+def tilted(samples: ToolpathSamples, rows: Ints, rings: int = 2) -> Floats:
+    """Return the leans (K, n, 3) of a grid over the cone at waypoints `rows`. rings: of the grid."""
     grid = tilts(samples.tilt, rings)
-    for start in range(0, len(samples.tilt_centres), block):
-        rows = np.arange(start, min(start + block, len(samples.tilt_centres)))
-        t1, t2 = tangent_frame(samples.nominal[rows])
-        b = samples.room(rows)[:, None] * (grid[:, None, :1] * t1 + grid[:, None, 1:] * t2)
-        leant = lean(samples.nominal[rows], b)
-        tips, axes = samples.machine_poses(placement, leant, rows)
-        all_margins = margins(tips, axes, placement, None if gaps is None else gaps[:, rows])
-        if (inside := samples.inside(leant, rows)) is not None:
-            all_margins[inside < 0.0] = -np.inf
-        yield b, all_margins
+    t1, t2 = tangent_frame(samples.nominal[rows])
+    leans = samples.room(rows)[:, None] * (grid[:, None, :1] * t1 + grid[:, None, 1:] * t2)
+    return np.asarray(leans, dtype=np.float64)
 
 
 def _best(

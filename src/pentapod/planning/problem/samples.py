@@ -77,8 +77,7 @@ class ToolpathSamples:
         """
         if self.common_axis is None:  # the cone is around these axes
             return replace(self, tilt=cone)
-        most = limit - self.common_axis.options.spare
-        return replace(self, tilt=cone, shares=None, own=own, limit=most)
+        return replace(self, tilt=cone, shares=None, own=own, limit=limit)
 
     def inside(self, axes: Floats, rows: Ints | slice = slice(None)) -> Floats | None:
         """Return by how much unit axes (..., 3) at waypoints `rows` keep the limit: a difference of cosines.
@@ -88,6 +87,15 @@ class ToolpathSamples:
         if self.own is None:
             return None
         return np.asarray((axes * self.own[rows]).sum(axis=-1) - np.cos(self.limit), dtype=np.float64)
+
+    def inside_by_lean(self, frames: Floats, leans: Floats, rows: Ints) -> Floats:
+        """Return the derivatives (n, 2) of `inside` by leans (n, 2) in frames (n, 2, 3) across the nominal axes."""
+        own = self.nominal[rows] if self.own is None else self.own[rows]
+        length = np.sqrt(1.0 + np.square(leans).sum(axis=1, keepdims=True))
+        axes = (self.nominal[rows] + np.einsum("na,nak->nk", leans, frames)) / length
+        cosine = (own * axes).sum(axis=1, keepdims=True)
+        slopes = np.einsum("nk,nak->na", own, frames) / length - cosine * leans / length**2
+        return np.asarray(slopes, dtype=np.float64)
 
     def at(self, rows: Ints) -> ToolpathSamples:
         """Return the samples of the waypoints `rows` only."""

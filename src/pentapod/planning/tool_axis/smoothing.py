@@ -287,14 +287,9 @@ class _Smoothing:
         if plain not in self.slopes:
             self.slopes[plain] = lean_slopes(self.problem, start.margins, start.transform, plain)
         slopes = self.slopes[plain](frames, leans, rows)
-        if (own := self.problem.samples.own) is None or len(plain) == len(kinds):
-            return slopes
-        # Of the cosine of the angle between own axis and n + b, which is normalised.
-        length = np.sqrt(1.0 + np.square(leans).sum(axis=1, keepdims=True))
-        across = np.einsum("nk,nak->na", own[rows], frames)
-        ahead = (own[rows] * self.problem.samples.nominal[rows]).sum(axis=1, keepdims=True)
-        cosine = (ahead + (across * leans).sum(axis=1, keepdims=True)) / length
-        return np.concatenate([slopes, (across / length - cosine * leans / length**2)[:, None]], axis=1)
+        if len(plain) < len(kinds):  # the last one is of the limit of the axes
+            slopes = np.concatenate([slopes, self.problem.samples.inside_by_lean(frames, leans, rows)[:, None]], axis=1)
+        return slopes
 
     def program(self, model: _Model, missed: Floats | None, tried: list[Floats] | None) -> BandedQP:
         """Return the convex program around a model.
