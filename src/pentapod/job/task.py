@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import partial
+from collections.abc import Callable
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -179,8 +180,9 @@ class Task:
         options = self._options()
         if self.before is not None and (kept := self.before.kept(self.toolpath, self.machine, options)) is not None:
             return kept
-        placed = self._planned(options, self.start)
-        met = self._meetings(placed)
+        meetings = lru_cache(maxsize=1)(self._meetings)
+        placed = self._planned(options, self.start, meetings)
+        met = meetings(placed)
         if met and options["tilt"] > 0.0 and self.start is None:
             common = bool(options["common_axis"])
             placed = self._planned({**options, "common_axis": FIXED} if common else {**options, "tilt": 0.0})
@@ -199,11 +201,17 @@ class Task:
             return retime_as_before(path, machine, self.before.laws, limits=self.limits, progress=progress)
         return retime(path, machine, limits=self.limits, progress=progress, jerk_options=self.law)
 
-    def _planned(self, options: PlacementOptions, start: PlacedPath | None = None) -> PlacedPath | Refusal:
+    def _planned(
+        self,
+        options: PlacementOptions,
+        start: PlacedPath | None = None,
+        meetings: Callable[[PlacedPath], Ranges] | None = None,
+    ) -> PlacedPath | Refusal:
         objective, progress = self.job.placement.then, self.runner.progress
         return plan(
-            self.toolpath, self.machine, **options, secondary_objective=objective, start=start, progress=progress
-        )
+            self.toolpath, self.machine, **options, secondary_objective=objective, start=start, meetings=meetings,
+            progress=progress,
+        )  # fmt: skip
 
     def _meetings(self, placed: PlacedPath | Refusal) -> Ranges:
         """Return where the tool meets the part; nowhere for jobs that want gouges reported only."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypedDict, Unpack
 
@@ -18,6 +18,7 @@ from pentapod.numerics.threads import on_one_thread
 from pentapod.planning.diagnosis import refusal
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.placement.base_reconfiguration import reconfigured
+from pentapod.planning.placement.between import Ranges, clear_between
 from pentapod.planning.placement.common_axes import OPTIONS as COMMON_AXES
 from pentapod.planning.placement.common_axes import CommonAxesOptions, Searched, with_common_axis
 from pentapod.planning.placement.own_leans import OwnLeans, leans_as_planned
@@ -67,6 +68,7 @@ def plan(
     seed: int = 0,
     solver: SolverName = "sequential",
     start: PlacedPath | None = None,
+    meetings: Callable[[PlacedPath], Ranges] | None = None,
     progress: Progress = silent,
 ) -> PlacedPath | Refusal:
     """Return placement, component and tool axes that maximise the smallest margin of the machine's limits on the path.
@@ -78,7 +80,8 @@ def plan(
     rail positions of a reconfigurable machine are optimised, too. secondary_objective: up to a tenth of the margin is
     given up for it. limits: kinds of limits besides pentapod's own. Deterministic for a seed. start: plan of nearly the
     same path on this machine; where it keeps the limits, so does what is found near its leans at its placement; else
-    both are improved, and there is no other search.
+    both are improved, and there is no other search. meetings: returns the ranges of waypoints between which the tool of
+    a placed path meets the part; the leans get more room there, as far as possible.
 
     Returns a Refusal that names limits, waypoints and shortfalls where the part does not fit. An interruption (Ctrl-C)
     ends the search with the best placement so far, if that fits; else KeyboardInterrupt is raised.
@@ -92,6 +95,14 @@ def plan(
         samples, machine, constraints, weights,
         component=component, collision_world=collision_world, limits=limits,
     )  # fmt: skip
+
+    def path(problem: PlacementProblem, at: Candidate, leans: Floats, chosen_by: str) -> PlacedPath:
+        def met(leans: Floats) -> Ranges:
+            return () if meetings is None else meetings(_path(toolpath, problem, at, leans, chosen_by))
+
+        if problem.samples.tilt > 0.0:
+            leans = clear_between(problem, at, leans, met, progress)
+        return _path(toolpath, problem, at, leans, chosen_by)
 
     def planned(rows: Ints) -> PlacedPath | Refusal:
         problem = whole.at(rows)
@@ -107,7 +118,7 @@ def plan(
             along = own.along_path(progress)
             if along is None:
                 return _refusal(toolpath, own)
-            return _path(toolpath, own.problem, best, along, found.choice)
+            return path(own.problem, best, along, found.choice)
         keep = max(KEPT_SHARE * best.smallest, NEEDED_MARGIN)
         if secondary_objective is not None and (constraints.moves or problem.samples.tilt > 0.0):
             progress("placement", 1.0, f"margin {best.smallest:.3f}; now the objective {secondary_objective}")
@@ -118,15 +129,16 @@ def plan(
             progress("tool axis", 0.0, f"smallest margin {best.smallest:.3f}")
             smooth = SOLVERS[solver](problem, False).smooth(best, min(keep, best.smallest), progress)
             leans = leans if smooth is None else AxisSpline.of(problem.samples, problem.cone).leans(smooth)
-        placed = _path(toolpath, everywhere, best, everywhere.samples.spread(leans, rows), found.choice)
+        placed = path(everywhere, best, everywhere.samples.spread(leans, rows), found.choice)
         if len(rows) < len(toolpath) and not placed.keeps(NEEDED_MARGIN):
             # A waypoint that does not shape the path may all the same be out of limits.
             return planned(np.arange(len(toolpath)))
         return placed
 
-    again = None if start is None else _as_planned(toolpath, _beside(whole, start), start, limit, progress)
-    if again is not None:
-        return again
+    if start is not None:
+        again = _as_planned(toolpath, _beside(whole, start), start, limit, progress)
+        if again is not None:
+            return path(*again, start.placement.chosen_by)
     return planned(samples.shaping(toolpath.starts))
 
 
@@ -195,15 +207,15 @@ def _beside(problem: PlacementProblem, start: PlacedPath) -> PlacementProblem:
 
 def _as_planned(
     toolpath: Toolpath, problem: PlacementProblem, start: PlacedPath, limit: float, progress: Progress
-) -> PlacedPath | None:
-    """Return the path placed as a plan of nearly the same path that keeps all limits; None where it does not."""
+) -> tuple[PlacementProblem, Candidate, Floats] | None:
+    """Return problem, candidate and leans (N, 3) of a plan of nearly the same path; None where limits are not kept."""
     here = problem.constraints.nearest_to(start.placement.transform)
     margins = next((each for each in problem.margins if each.scene.branch == start.component), None)
     if not start.keeps(NEEDED_MARGIN) or margins is None:
         return None
     at = problem.candidate(margins, here, problem.upright)
-    leans = leans_as_planned(problem, at, toolpath, start, limit, progress)
-    return None if leans is None else _path(toolpath, problem, at, leans, start.placement.chosen_by)
+    found = leans_as_planned(problem, at, toolpath, start, limit, progress)
+    return None if found is None else (found[0], at, found[1])
 
 
 def _path(toolpath: Toolpath, problem: PlacementProblem, at: Candidate, leans: Floats, chosen_by: str) -> PlacedPath:

@@ -1,5 +1,7 @@
 """Margins of bodies against meshes: true gaps, their formula at contacts, and plans that keep clear of a fixture."""
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -21,9 +23,11 @@ from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.ipopt import IpoptSolver
 from pentapod.planning.placement.sampling import SamplingOptions, first_candidate, first_guesses
 from pentapod.planning.placement.sequential import SequentialSolver
+from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.planning.problem.formulation import step_slopes, stepped
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
+from pentapod.planning.problem.weights import EVEN, Weights
 from pentapod.planning.tool_axis.spline import AxisSpline
 
 PLUS = Component(1, 1)
@@ -113,6 +117,37 @@ def test_margins_are_distances_of_samples(desk, crowd, place):
             large = fixture.copy().apply_scale(1e4)
             oracle = -trimesh.proximity.signed_distance(large, 1e4 * samples).max() / 1e4 - desk.bodies.leg_radius
             assert outer[row, leg] == pytest.approx(min(oracle, caps[leg]), abs=2e-3)
+
+
+@pytest.mark.parametrize("enough", [0.05, 0.5, 2.0])
+def test_margins_of_obstacles_that_are_large_enough_need_not_be_exact(enough, desk, crowd, place):
+    tips, axes = poses(desk, 400, seed=5)
+    margins = Margins.of(desk, PLUS, crowd)
+    exact, own = margins(tips, axes, place), len(margins.own_limits)
+    found = margins(tips, axes, place, enough=enough)
+    np.testing.assert_array_equal(found[:, :own], exact[:, :own])
+    np.testing.assert_allclose(found[:, own:], np.minimum(exact[:, own:], enough), atol=2e-3 if enough < 1.0 else 0.0)
+    assert (exact[:, own:] < enough).any()
+
+
+def test_a_waypoint_that_needs_room_has_smaller_margins_to_obstacles_alone(desk, crowd, place):
+    tips = 0.02 * np.random.default_rng(6).normal(size=(30, 3)) + [0.06, 0.02, 0.01]
+    samples = ToolpathSamples(tips, np.tile([0.0, 0.0, 1.0], (30, 1)), 0.0, TILT)
+    fixed = PlacementConstraints.fixture([place])
+    plain = PlacementProblem.of(samples, desk, fixed, component=PLUS, collision_world=crowd)
+    spare = np.where(np.arange(30) < 10, 0.3, 0.0)
+    rows, leans, margins = np.array([2, 5, 20]), np.zeros((3, 3)), plain.margins[0]
+    own = len(margins.own_limits)
+    for weights in (EVEN, Weights(bodies=2.0)):
+        problem = replace(plain, weights=weights)
+        roomy = replace(problem, spare=spare)
+        before, after = (each.values_of(margins, place, leans, rows) for each in (problem, roomy))
+        np.testing.assert_array_equal(after[:, :own], before[:, :own])
+        less = spare[rows, None] / weights.bodies
+        np.testing.assert_allclose(after[:, own:], before[:, own:] - less, atol=1e-12)
+        np.testing.assert_array_equal(roomy.at(rows).values_of(margins, place, leans), after)
+        quick = roomy.values_of(margins, place, leans, rows, enough=0.4)
+        assert (quick >= np.minimum(after, 0.4) - 1e-12).all()
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.problem.weights import NEEDED_MARGIN
-from pentapod.planning.tool_axis.smoothing import OPTIONS
+from pentapod.planning.tool_axis.smoothing_options import OPTIONS
 from pentapod.planning.tool_axis.spline import AxisSpline
 
 TILT = np.radians(15.0)

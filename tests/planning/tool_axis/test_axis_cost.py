@@ -13,7 +13,8 @@ from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.tool_axis.cost import AxisCost, CostOptions
-from pentapod.planning.tool_axis.smoothing import SmoothingOptions, smoothed
+from pentapod.planning.tool_axis.smoothing import smoothed
+from pentapod.planning.tool_axis.smoothing_options import SmoothingOptions
 from pentapod.planning.tool_axis.spline import BANDS, OPTIONS, AxisSpline
 
 KEPT = 0.9

@@ -38,6 +38,16 @@ class SoftRows:
     upper: Floats
     weight: Floats
 
+    def and_more(self, others: SoftRows) -> SoftRows:
+        """Return these inequalities and others."""
+        if not len(self.upper):
+            return others
+        both = (
+            np.concatenate([getattr(each, name) for each in (self, others)])
+            for name in ("windows", "starts", "upper", "weight")
+        )
+        return SoftRows(*both)
+
 
 NO_ROWS = SoftRows(np.zeros((0, 1)), np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))
 
@@ -47,8 +57,8 @@ class BandedQP:
     """The program. hessian (B, 2K) in lower banded form, gradient (2K,): of the cost, whose size is about `scale`.
 
     basis (W, K) sparse, four neighbours a row: leans b = basis @ c. Inequality r: slopes[r] · b[point[r]] ≤ upper[r];
-    point (R,) ascending. The trust region: |c_k − centre_k| ≤ reach. accuracy: the duality gap, as a share of
-    the scale, at which an answer is good.
+    point (R,) ascending. The trust region: |c_k − centre_k| ≤ reach, a number or (K,). accuracy: the duality gap, as a
+    share of the scale, at which an answer is good.
     """
 
     hessian: Floats
@@ -59,7 +69,7 @@ class BandedQP:
     slopes: Floats
     upper: Floats
     centre: Floats
-    reach: float
+    reach: Floats | float
     soft: SoftRows = NO_ROWS
     accuracy: float = 1e-6
 

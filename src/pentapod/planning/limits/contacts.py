@@ -82,47 +82,52 @@ def contacts(
     *,
     numbers: bool = True,
     gaps: Floats | None = None,
+    enough: float = OPTIONS.cap,
 ) -> Contacts:
     """Return the contacts of tool poses (N, 3), machine frame, with the workpiece placed.
 
     numbers: False for the margins alone, which takes less time. gaps (N, obstacles): of the tool body, as `tool_gap`,
-    where they are known; used for margins alone. NaN for obstacles of the machine.
+    where they are known; used for margins alone. NaN for obstacles of the machine. enough: larger margins are given as
+    this one, which takes less time.
     """
+    cap = min(enough, OPTIONS.cap)
     machine, tool, obstacles = scene.machine, scene.collision_world.tool, scene.collision_world.obstacles
     position, direction = tips + machine.tool_length * axes, -axes
     comforts = body_comforts(scene)
     comfortable, moving = np.tile(comforts, len(obstacles)), len(comforts)
     both = np.zeros((len(tips), len(comfortable), 1 + NUMBERS))
-    both[..., 0], both[..., -1] = OPTIONS.cap * comfortable, -OPTIONS.cap * comfortable
+    both[..., 0], both[..., -1] = cap * comfortable, -cap * comfortable
     for k, obstacle in enumerate(obstacles):
         frame = placement if obstacle.clamped else None
-        rows = _near(scene, obstacle, tips, axes, frame)
+        rows = _near(scene, obstacle, tips, axes, frame, cap)
         if not len(rows):
             continue
         bodies = MovingBodies.at(machine, position[rows], direction[rows], frame)
-        columns = _lines(machine, obstacle, bodies, comforts)
+        columns = _lines(machine, obstacle, bodies, comforts, cap)
         if tool:
-            cap, known = OPTIONS.cap * comforts[-1], None
+            reach, known = cap * comforts[-1], None
             if gaps is not None and not numbers and obstacle.clamped:
-                known = _with_gaps(gaps[rows, k], cap)
-            columns.append(_tool(obstacle, tool, bodies, cap, numbers=numbers) if known is None else known)
+                known = _with_gaps(gaps[rows, k], reach)
+            columns.append(_tool(obstacle, tool, bodies, reach, numbers=numbers) if known is None else known)
         both[rows, k * moving : (k + 1) * moving] = np.stack(columns, axis=1)
     return Contacts(both[..., 0] / comfortable, both[..., 1:].reshape(len(tips), NUMBERS * len(comfortable)))
 
 
-def _lines(machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts: Sequence[float]) -> list[Floats]:
-    """Return for legs and spindle the gaps and the numbers of their contacts, each (N, 1 + NUMBERS).
+def _lines(
+    machine: Machine, obstacle: Obstacle, bodies: MovingBodies, comforts: Sequence[float], cap: float
+) -> list[Floats]:
+    """Return for legs and spindle the gaps, up to margins `cap`, and the numbers of their contacts, (N, 1 + NUMBERS).
 
     Places: from 0 to 1 along a leg, from 1 to 2 along its arm; along the spindle, heights over the tip.
     """
     top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
     columns, bars = list[Floats](), len(machine.bars.names)
     for body in range(bars + 1):
-        radius, cap = float(bodies.radii[body]), OPTIONS.cap * comforts[body]
+        radius, reach = float(bodies.radii[body]), cap * comforts[body]
         places = (0.0, 1.0) if body < bars else (top, nose)
-        column = _column(obstacle, bodies.starts[:, body], bodies.ends[:, body], radius, cap, places)
+        column = _column(obstacle, bodies.starts[:, body], bodies.ends[:, body], radius, reach, places)
         if bodies.arms[body]:
-            arm = _column(obstacle, bodies.ends[:, body], bodies.feet[:, body], radius, cap, (1.0, 2.0))
+            arm = _column(obstacle, bodies.ends[:, body], bodies.feet[:, body], radius, reach, (1.0, 2.0))
             column = np.where((arm[:, 0] < column[:, 0])[:, None], arm, column)
         columns.append(column)
     return columns
@@ -150,8 +155,10 @@ def _column(
     return column
 
 
-def _near(scene: Scene, obstacle: Obstacle, tips: Floats, axes: Floats, frame: RigidTransform | None) -> Ints:
-    """Return the indices of those poses (N, 3) in which a body's bounding box is near the obstacle's."""
+def _near(
+    scene: Scene, obstacle: Obstacle, tips: Floats, axes: Floats, frame: RigidTransform | None, cap: float
+) -> Ints:
+    """Return the indices of those poses (N, 3) in which a body's box may be nearer than `cap` to the obstacle's."""
     machine, tool, comforts = scene.machine, scene.collision_world.tool, scene.comforts
     bars, bodies = machine.bars, machine.bodies
     position, arms = tips + machine.tool_length * axes, np.flatnonzero(bars.beside).tolist()
@@ -164,14 +171,14 @@ def _near(scene: Scene, obstacle: Obstacle, tips: Floats, axes: Floats, frame: R
     top, nose = (machine.tool_length - offset for offset in spindle_ends(machine))
     lines = [(base[:, k], joints[:, k]) for k in range(joints.shape[1])]
     lines += [(joints[:, k], foot) for k, foot in feet.items()]
-    reaches = [OPTIONS.cap * comforts.leg_obstacle + float(bars.radii.max())] * len(lines)
+    reaches = [cap * comforts.leg_obstacle + float(bars.radii.max())] * len(lines)
     lines.append((tips + nose * axes, tips + top * axes))
-    reaches.append(OPTIONS.cap * comforts.spindle_obstacle + bodies.shaft_radius)
+    reaches.append(cap * comforts.spindle_obstacle + bodies.shaft_radius)
     if tool:
         least, most = min(s.low - s.rounding for s in tool), max(s.top for s in tool)
         lines.append((tips + least * axes, tips + most * axes))
         wide = max(max(s.low_radius, s.high_radius) + s.rounding for s in tool)
-        reaches.append(OPTIONS.cap * comforts.tool_obstacle + wide)
+        reaches.append(cap * comforts.tool_obstacle + wide)
     near = np.zeros(len(tips), dtype=np.bool_)
     for (a, b), reach in zip(lines, reaches, strict=True):
         near |= _box_gap(obstacle, a, b) < reach

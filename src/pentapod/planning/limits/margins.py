@@ -22,7 +22,7 @@ from pentapod.machine.clearance.collision_world import NOTHING, CollisionWorld
 from pentapod.machine.machine import Machine
 from pentapod.numerics.blocks import blocks
 from pentapod.planning.limits.base_joints import BaseJointCone
-from pentapod.planning.limits.contacts import NUMBERS, contacts
+from pentapod.planning.limits.contacts import NUMBERS, OPTIONS, contacts
 from pentapod.planning.limits.leg_pairs import LegPairClearance
 from pentapod.planning.limits.leg_spindle import LegSpindleClearance
 from pentapod.planning.limits.leg_tool import LegToolClearance
@@ -95,16 +95,17 @@ class Margins:
         placement: RigidTransform | None = None,
         gaps: Floats | None = None,
         block: int = BLOCK,
+        enough: float = OPTIONS.cap,
     ) -> Floats:
         """Return margins (..., M) of tool tips and axes (tip → spindle), both (..., 3), machine frame.
 
         placement: of the workpiece; needed where there are obstacles. gaps (..., obstacles): as for `contacts`. block:
-        poses at a time, to bound the memory.
+        poses at a time, to bound the memory. enough: larger margins to obstacles may be given as this one.
         """
         if tips.ndim == 2 and len(tips) > block:
             return np.concatenate(
                 [
-                    self(tips[part], axes[part], placement, None if gaps is None else gaps[part])
+                    self(tips[part], axes[part], placement, None if gaps is None else gaps[part], enough=enough)
                     for part in blocks(len(tips), block)
                 ]
             )
@@ -115,7 +116,7 @@ class Margins:
             raise ArrayError("gaps to the part depend on the placement", key="placement", expected="a RigidTransform")
         known = None if gaps is None else gaps.reshape(-1, gaps.shape[-1])
         poses = tips.reshape(-1, 3), axes.reshape(-1, 3)
-        outer = contacts(self.scene, *poses, placement, numbers=False, gaps=known).margins
+        outer = contacts(self.scene, *poses, placement, numbers=False, gaps=known, enough=enough).margins
         return np.concatenate([own, outer.reshape(*own.shape[:-1], -1)], axis=-1)
 
     def own(self, tips: Floats, axes: Floats, block: int = BLOCK) -> Floats:

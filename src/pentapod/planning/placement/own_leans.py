@@ -23,8 +23,9 @@ from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.problem.weights import NEEDED_MARGIN
-from pentapod.planning.tool_axis.smoothing import OPTIONS as SMOOTHING
-from pentapod.planning.tool_axis.smoothing import SmoothingOptions, smoothed
+from pentapod.planning.tool_axis.smoothing import smoothed
+from pentapod.planning.tool_axis.smoothing_options import OPTIONS as SMOOTHING
+from pentapod.planning.tool_axis.smoothing_options import SmoothingOptions
 from pentapod.planning.tool_axis.spline import AxisSpline, stations_of
 from pentapod.toolpath.toolpath import Toolpath
 
@@ -92,7 +93,8 @@ class OwnLeans:
     def of(cls, problem: PlacementProblem, at: Candidate) -> OwnLeans:
         """Return the own leans where a candidate of a problem falls short."""
         field = problem.leans(at.coefficients)
-        rows = np.flatnonzero(problem.values_of(at.margins, at.transform, field).min(axis=1) < asked())
+        values = problem.values_of(at.margins, at.transform, field, enough=2.0 * asked())
+        rows = np.flatnonzero(values.min(axis=1) < asked())
         return cls(problem, at, field, rows, *_best_tilted(problem.samples.at(rows), at))
 
     def in_best_cone(self, own: Floats, limit: float) -> OwnLeans:
@@ -134,7 +136,7 @@ class OwnLeans:
             return None
         # What the spline through them keeps is not lost where no smoother one is found.
         keep = float(np.clip(self.even.smallest, ENOUGH, asked()))
-        return _along(self.problem, self.at, keep, self.even.leans, progress, QUICKLY)
+        return along_spline(self.problem, self.at, keep, self.even.leans, progress, QUICKLY)
 
     @cached_property
     def even(self) -> EvenLeans:
@@ -158,7 +160,7 @@ class OwnLeans:
     def _values(self, leans: Floats) -> Floats:
         """Return the smallest margin (N,) at each waypoint; too small beyond the limit of the axes."""
         problem, samples = self.problem, self.problem.samples
-        values = problem.values_of(self.at.margins, self.at.transform, leans).min(axis=1)
+        values = problem.values_of(self.at.margins, self.at.transform, leans, enough=2.0 * asked()).min(axis=1)
         inside = samples.inside(lean(samples.nominal, leans))
         return values if inside is None else np.minimum(values, asked() + inside)
 
@@ -193,8 +195,10 @@ def leans_as_planned(
     placed: PlacedPath,
     limit: float,
     progress: Progress = silent,
-) -> Floats | None:
+) -> tuple[PlacementProblem, Floats] | None:
     """Return leans (N, 3) of a path near those of a plan of nearly the same path; None where none were found.
+
+    With them comes the problem, which may have a wider cone.
 
     problem: at all waypoints of the path, with the common axis of that plan; at: a candidate at its placement. limit:
     as for `in_cones`.
@@ -206,14 +210,16 @@ def leans_as_planned(
     axes = placed.placement.transform.inverse().rotate(placed.axes)[KDTree(known).query(wanted)[1]]
     leans = axes / (axes * samples.nominal).sum(axis=1, keepdims=True) - samples.nominal
     smallest = float(problem.values_of(at.margins, at.transform, leans).min())
-    keep = max(ENOUGH, min(options.kept * placed.smallest_margin, smallest))
+    # Where the leans keep little by themselves, they come up to what the plan had, with the spare.
+    keep = max(ENOUGH, min(options.kept * placed.smallest_margin, max(smallest, asked())))
     steepest = np.linalg.norm(leans, axis=1)
     cones = in_cones(problem, path.axes, limit)
     wide = next((each for each in cones if (steepest <= each.longest()).all()), cones[-1])
-    return _along(wide, at, keep, leans, progress, SMOOTHING)
+    found = along_spline(wide, at, keep, leans, progress, SMOOTHING)
+    return None if found is None else (wide, found)
 
 
-def _along(
+def along_spline(
     problem: PlacementProblem,
     at: Candidate,
     keep: float,
@@ -221,5 +227,6 @@ def _along(
     progress: Progress,
     options: SmoothingOptions,
 ) -> Floats | None:
+    """Return leans (N, 3) of a smooth spline from given ones that keeps a margin, or a part of it; None without."""
     spline = smoothed(problem, at, keep, options, progress, leans)
     return None if spline is None else AxisSpline.of(problem.samples, problem.cone).leans(spline)

@@ -41,7 +41,8 @@ class PlacementProblem:
     """Maximise the smallest weighted margin over the placement of a part and the tilt field of the tool.
 
     margins: one for each branch to choose from. basis (N, size): the tilt field's spline basis at the waypoints, times
-    the share of the cone that may be used there; without a tilt cone it has size 0.
+    the share of the cone that may be used there; without a tilt cone it has size 0. spare (N,): margin to obstacles
+    that waypoints need besides; None where none does.
     """
 
     samples: ToolpathSamples
@@ -51,6 +52,7 @@ class PlacementProblem:
     basis: Floats
     constraints: PlacementConstraints
     weights: Weights
+    spare: Floats | None = None
 
     @classmethod
     def of(
@@ -79,7 +81,8 @@ class PlacementProblem:
 
     def at(self, rows: Ints) -> PlacementProblem:
         """Return the problem of the waypoints `rows` alone, with the same tilt field."""
-        return replace(self, samples=self.samples.at(rows), basis=self.basis[rows])
+        spare = None if self.spare is None else self.spare[rows]
+        return replace(self, samples=self.samples.at(rows), basis=self.basis[rows], spare=spare)
 
     def at_all(self, samples: ToolpathSamples) -> PlacementProblem:
         """Return the problem of all waypoints of the path, which has the samples `samples` along its own axes."""
@@ -126,11 +129,20 @@ class PlacementProblem:
         return self.values_of(margins, transform, self.leans(coefficients, rows), rows)
 
     def values_of(
-        self, margins: Margins, transform: RigidTransform, leans: Floats, rows: Ints | slice = slice(None)
-    ) -> Floats:
-        """Return the margins (n, M), weighed, for leans (n, 3), workpiece frame, at waypoints `rows`."""
+        self, margins: Margins, transform: RigidTransform, leans: Floats, rows: Ints | slice = slice(None),
+        enough: float = np.inf,
+    ) -> Floats:  # fmt: skip
+        """Return the margins (n, M), weighed, for leans (n, 3), workpiece frame, at waypoints `rows`.
+
+        enough: larger margins to obstacles need not be exact, only at least this; that takes less time.
+        """
         axes = lean(self.samples.nominal[rows], leans)
-        plain = margins(*self.samples.machine_poses(transform, axes, rows), transform)
+        poses = self.samples.machine_poses(transform, axes, rows)
+        spare = None if self.spare is None else self.spare[rows, None]
+        enough = self.weights.plain(enough) + (0.0 if spare is None else float(spare.max(initial=0.0)))
+        plain = margins(*poses, transform, enough=enough)
+        if spare is not None:
+            plain[..., len(margins.own_limits) :] -= spare
         return plain if self.weights.are_even else weighed(plain, self.weights.of(margins.limits))
 
     def contacts(self, margins: Margins, transform: RigidTransform, leans: Floats, rows: Ints) -> Floats:

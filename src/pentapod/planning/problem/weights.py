@@ -48,6 +48,13 @@ class Weights(Value):
         """Return the weight (M,) of each limit."""
         return np.array([getattr(self, limit.group) for limit in limits], dtype=np.float64)
 
+    def plain(self, margin: float) -> float:
+        """Return the plain margin that, weighed, is at least `margin` in each group."""
+        if self.are_even:
+            return margin
+        heaviest = max(getattr(self, field.name) for field in fields(self))
+        return NEEDED_MARGIN + (margin - NEEDED_MARGIN) * heaviest
+
 
 EVEN = Weights()
 

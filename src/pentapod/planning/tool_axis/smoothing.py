@@ -1,89 +1,24 @@
 """Smoothing of the tool axis: the smoothest axes that keep a margin, by sequential convex programming.
 
 Each program holds the margins near the one to keep, to first order, and the penalty on excess. Its solution is judged
-by the margins and the cost themselves, at the waypoints where the spline has its nodes. In the end all waypoints are
-checked; those with too little margin are added, and the iteration is repeated.
+by the margins and the cost themselves, at the waypoints where the spline has its nodes. Where it fails at some places
+alone, it is taken elsewhere, and the next one may move less there. In the end all waypoints are checked; those with too
+little margin are added, and the iteration is repeated.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.base.progress import Progress, silent
-from pentapod.numerics.convex.banded_qp import NO_ROWS, BandedQP
-from pentapod.planning.problem.formulation import Slopes, lean_slopes
+from pentapod.numerics.convex.banded_qp import BandedQP
 from pentapod.planning.problem.linear_model import valleys
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
-from pentapod.planning.problem.tilt_field import lean
-from pentapod.planning.tool_axis.cost import AxisCost, CostOptions
-from pentapod.planning.tool_axis.spline import AxisSpline, within_discs
-
-
-@dataclass(frozen=True)
-class SmoothingOptions:
-    """Options of the sequential convex programming.
-
-    steps, rounds: maximum of programs, and of checks at all waypoints. slack: accepted shortfall of the margin to keep,
-    micrometres of a stroke. near: margins within this distance of the one to keep enter a program. spare: except those
-    that, to first order, stay this much above it within the trust region. decrease: relative decrease of the cost below
-    which the iteration stops. shortfall, saving: a step whose margin is short by less than `shortfall` is accepted if
-    it saves the share `saving` of the cost; the next step restores the margin. largest_radius, least_radius: of the
-    trust region, as shares of the cone; next_radius: the least with which it begins for another margin to keep. good:
-    ratio of actual to predicted decrease from which it is doubled; shrink: its factor after a rejected step. rough,
-    fine, finer: accuracies of the first program and of the last, and the accuracy in between as a share of the relative
-    decrease of the step before. levels: steps in which given leans come up to the margin to keep; enough: share of it
-    that is enough where they come up no farther; far: all waypoints within this distance of it are active then. cost:
-    of the penalty on excess.
-    """
-
-    steps: int = 40
-    rounds: int = 8
-    slack: float = 1e-5
-    near: float = 0.15
-    spare: float = 0.02
-    decrease: float = 2e-3
-    shortfall: float = 1e-2
-    saving: float = 0.1
-    largest_radius: float = 2.0
-    least_radius: float = 1e-3
-    next_radius: float = 0.5
-    good: float = 0.25
-    shrink: float = 0.4
-    rough: float = 1e-3
-    fine: float = 1e-6
-    finer: float = 1e-2
-    levels: int = 4
-    enough: float = 0.5
-    far: float = 0.3
-    cost: CostOptions = field(default_factory=CostOptions)
-
-
-OPTIONS = SmoothingOptions()
-
-
-@dataclass(frozen=True, eq=False)
-class _Model:
-    """Margins near the one to keep, around coefficients c, to first order.
-
-    active, rows (R,): the waypoint, as index into the active ones and into all; kinds, values (R,): which margin, and
-    its value at c; slopes (R, 2): derivatives by the lean as a share of the cone.
-    """
-
-    c: Floats
-    active: Ints
-    rows: Ints
-    kinds: Ints
-    values: Floats
-    slopes: Floats
-
-    def missed(self, spline: AxisSpline, trial: Floats, values: Floats) -> Floats:
-        """Return the overestimates (R,) of the linear model at `trial`, whose margins are `values` (n, M)."""
-        moved = (spline.basis @ (trial - self.c))[self.rows]
-        predicted = self.values + (self.slopes * moved).sum(axis=1)
-        return np.maximum(predicted - values[self.active, self.kinds], 0.0)
+from pentapod.planning.tool_axis.axis_programs import AxisPrograms, MarginModel, Trial, shaped_by
+from pentapod.planning.tool_axis.smoothing_options import OPTIONS, SmoothingOptions
+from pentapod.planning.tool_axis.spline import within_discs
+from pentapod.planning.tool_axis.trust_region import TrustRegion
 
 
 def smoothed(
@@ -100,85 +35,86 @@ def smoothed(
     first spline that keeps the margin, or a part of it (`enough`), where the search for the smoothest one fails. None
     where none was found. progress: gets a report after each program; how many there will be is not known.
     """
-    run = _Smoothing(problem, start, keep, options, progress, leans)
+    run = _Smoothing(AxisPrograms(problem, start, options), keep, progress, leans)
     if leans is None:
         run.begin()
     else:
         reached = run.approached()
         if reached < keep:
-            return run.kept(run.c, reached) if reached >= options.enough * keep else None
-    begun = run.c
+            return run.kept(run.at.c, reached) if reached >= options.enough * keep else None
+    begun = run.at.c
     for _ in range(options.rounds):
         found = run.smoothest()
         if found is None:
             break
         if not run.add_violated():
             return found
+        run.return_to(begun)
     return None if leans is None else run.kept(begun, keep)
 
 
 class _Smoothing:
-    """One run. c: the present coefficients; short: their shortfall of the margin to keep; cost: theirs.
+    """One run. at: the present coefficients.
 
-    rows (n,): the active waypoints; margins (n, M): theirs, at c; violated (n, M): which of them have been short; kinds
-    (M,): which margins have been near the one to keep. radius: of the trust region; accuracy: of the next program.
+    rows (n,): the active waypoints; violated (n, M): which of their margins have been short. trust: the region of the
+    next program; accuracy: its; elastic: whether it may leave margins short.
     """
 
-    def __init__(
-        self,
-        problem: PlacementProblem,
-        start: Candidate,
-        keep: float,
-        options: SmoothingOptions,
-        progress: Progress,
-        leans: Floats | None = None,
-    ) -> None:
-        self.problem, self.start, self.keep, self.options = problem, start, keep, options
-        self.progress, self.programs = progress, 0
-        self.spline = AxisSpline.of(problem.samples, problem.cone)
-        self.objective = AxisCost(problem, self.spline, start, options.cost)
-        self.slopes: dict[tuple[int, ...], Slopes] = {}
-        self.kinds: Bools = np.zeros(len(start.margins.limits) + (problem.samples.own is not None), dtype=bool)
-        self.radius, self.accuracy = options.largest_radius, options.rough
-        self.c = self.spline.fitted(problem.leans(start.coefficients) if leans is None else leans)
-        self.cost = self.objective.of(self.c)
-        everywhere = self.values(self.c, np.arange(len(self.spline.frames)))
-        rows = np.union1d(self.spline.nodes, valleys(everywhere))
+    def __init__(self, programs: AxisPrograms, keep: float, progress: Progress, leans: Floats | None = None) -> None:
+        self.programs, self.options, self.keep = programs, programs.options, keep
+        self.progress, self.solved, self.accuracy = progress, 0, self.options.rough
+        self.elastic = False
+        spline, start = programs.spline, programs.start
+        c = spline.fitted(programs.problem.leans(start.coefficients) if leans is None else leans)
+        self.trust = TrustRegion.of(len(c))
+        everywhere = programs.values(c, np.arange(len(spline.frames)), keep)
+        rows = np.union1d(spline.nodes, valleys(everywhere))
         if leans is not None:
-            rows = np.union1d(rows, np.flatnonzero(everywhere.min(axis=1) < keep + options.far))
-        self.activate(rows)
+            rows = np.union1d(rows, np.flatnonzero(everywhere.min(axis=1) < keep + self.options.far))
+        self.begin_at(c, rows)
 
-    def activate(self, rows: Ints) -> None:
-        """Compute margins at these waypoints from now on."""
+    def begin_at(self, c: Floats, rows: Ints) -> None:
+        """Take coefficients as the present ones, and compute margins at these waypoints from now on."""
         self.rows = rows
-        self.margins = self.values(self.c, rows)
-        self.short = self.keep - float(self.margins.min())
-        self.violated: Bools = self.margins < self.keep
+        self.at = self.trial(c)
+        self.violated: Bools = self.at.margins < self.keep
+
+    def trial(self, c: Floats) -> Trial:
+        """Return what coefficients (K, 2) have at the active waypoints."""
+        return self.programs.trial(c, self.rows, self.keep)
 
     def add_violated(self) -> bool:
         """Check all waypoints, activate those with too little margin, and return whether there were any."""
-        margins = self.values(self.c, np.arange(len(self.spline.frames)))
+        margins = self.programs.values(self.at.c, np.arange(len(self.programs.spline.frames)), self.keep)
         worst = np.flatnonzero(margins.min(axis=1) < self.keep - self.options.slack)
         if len(worst) > 0:
-            self.activate(np.union1d(self.rows, worst))
+            self.begin_at(self.at.c, np.union1d(self.rows, worst))
         return len(worst) > 0
+
+    def return_to(self, begun: Floats) -> None:
+        """Go back to coefficients (K, 2) that keep the margin, if they do, where the present ones do not."""
+        found, start = self.at, self.trial(begun)
+        if start.short > self.options.slack:
+            return
+        self.at = start
+        part, _ = self.where_it_holds(found, self.failing(found))
+        if self.accepts(part):
+            self.at = part
 
     def begin(self) -> None:
         """Start from the smoothest spline without the penalty, if its cost is lower."""
-        trial = self.program(self.model(), None, None).solved()
-        if trial is not None:
-            trial = within_discs(trial)
-            margins, cost = self.values(trial, self.rows), self.objective.of(trial)
-            short = self.keep - float(margins.min())
-            if cost < self.cost and short < max(self.short, self.options.shortfall):
-                self.c, self.margins, self.short, self.cost = trial, margins, short, cost
+        c = self.next_program(self.model(), None, None).solved()
+        if c is not None:
+            trial = self.trial(within_discs(c))
+            if trial.cost < self.at.cost and trial.short < max(self.at.short, self.options.shortfall):
+                self.at = trial
 
     def approached(self) -> float:
         """Come up to the margin to keep in steps, and return how far that is done.
 
         In one step the linear model may have no solution where the margins themselves have one.
         """
-        keep, short, levels = self.keep, self.short, self.options.levels
+        keep, short, levels = self.keep, self.at.short, self.options.levels
         if short <= self.options.slack:
             return keep
         for k in range(1, levels + 1):
@@ -189,125 +125,144 @@ class _Smoothing:
 
     def kept(self, c: Floats, keep: float) -> Floats | None:
         """Return the first spline from coefficients (K, 2) that keeps a margin everywhere, however smooth; or None."""
-        self.c, self.cost, self.keep, self.radius = c, self.objective.of(c), keep, self.options.largest_radius
-        self.activate(self.rows)
+        self.keep, self.trust = keep, TrustRegion.of(len(c))
+        self.begin_at(c, self.rows)
         for _ in range(self.options.rounds):
-            if self.short > self.options.slack and self.smoothest(first=True) is None:
+            if self.at.short > self.options.slack and self.smoothest(first=True) is None:
                 return None
             if not self.add_violated():
-                return self.c
+                return self.at.c
         return None
 
     def aim(self, keep: float) -> None:
         """Keep another margin from now on."""
-        if self.problem.samples.own is not None:
-            self.margins[:, -1] += keep - self.keep
-        self.keep = keep
-        self.radius = min(max(2.0 * self.radius, self.options.next_radius), self.options.largest_radius)
-        self.short = keep - float(self.margins.min())
-        self.violated = self.margins < keep
+        self.at, self.keep = self.at.aimed_at(keep, own_limit=self.programs.own_limit), keep
+        self.trust.widen(self.options.next_radius)
+        self.violated = self.at.margins < keep
 
     def smoothest(self, *, first: bool = False) -> Floats | None:
         """Return the smoothest spline that keeps the margin at the active waypoints, or None.
 
         first: return the first one that does.
         """
-        options = self.options
+        options, slack = self.options, self.options.slack
         model, missed, tried = self.model(), None, list[Floats]()
-        for _ in range(options.steps):
-            program = self.program(model, missed, tried)
-            trial = program.solved()
-            if trial is None:
-                self.radius, missed = options.shrink * self.radius, None
-            else:
-                trial = within_discs(trial)
-                margins, cost = self.values(trial, self.rows), self.objective.of(trial)
-                short, gain = self.keep - float(margins.min()), self.cost - cost
-                predicted = program.cost_of(self.c) - program.cost_of(trial)
-                length = float(np.linalg.norm(trial - self.c, axis=1).max())
-                self.violated |= margins < self.keep
-                if self.accepts(short, gain):
-                    small = max(gain, predicted) < options.decrease * self.cost
-                    converged = self.short <= options.slack and small and length < 0.99 * self.radius
-                    self.accuracy = float(np.clip(options.finer * gain / self.cost, options.fine, options.rough))
-                    self.c, self.margins, self.short, self.cost = trial, margins, short, cost
-                    if converged or (first and self.short <= options.slack):
-                        break
-                    if gain > options.good * predicted:
-                        self.radius = min(2.0 * self.radius, options.largest_radius)
-                    else:
-                        self.radius = max(0.5 * length, options.least_radius)
-                    model, missed, tried = self.model(), None, []
-                elif short <= options.slack and predicted < options.decrease * self.cost:  # no smoother one is expected
-                    break
-                elif short > options.slack and missed is None:  # once more, corrected by the errors of the model
-                    model = self.model()
-                    missed = model.missed(self.spline, trial, margins)
-                elif short <= options.slack and not tried:  # once more, with the penalty at the trial
-                    tried = [trial]
-                else:
-                    self.radius, missed = options.shrink * min(self.radius, length), None
-            if self.radius < options.least_radius:
+        best, since = self.at if self.at.short <= slack else None, 0
+        self.elastic = False
+        for k in range(options.steps + options.back):
+            if k >= options.steps and self.at.short <= slack:
                 break
-        return self.c if self.short <= options.slack else None
+            program, now = self.next_program(model, missed, tried), self.at
+            c = program.solved()
+            if c is None:
+                if self.elastic or self.at.short <= slack:
+                    self.trust.shrink()
+                self.elastic, missed = self.at.short > slack, None
+            else:
+                trial = self.trial(within_discs(c))
+                lengths = np.linalg.norm(trial.c - self.at.c, axis=1)
+                predicted = -np.inf if self.elastic else program.cost_of(self.at.c) - program.cost_of(trial.c)
+                taken, failing = self.taken(trial, predicted, again=missed is not None)
+                if taken is not None:
+                    gain = now.cost - taken.cost
+                    self.at, best = taken, taken if taken.short <= slack else best
+                    if first and taken.short <= slack:
+                        break
+                    small = max(gain, predicted) < options.decrease * now.cost
+                    if small and now.short <= slack and (lengths < 0.99 * self.trust.radii).all():  # converged
+                        break
+                    self.elastic = False
+                    self.accuracy = float(np.clip(options.finer * gain / now.cost, options.fine, options.rough))
+                    # A step that restores the margin may cost something: not much more than was expected.
+                    least = min(options.good * predicted, predicted / options.good)
+                    self.trust.after(lengths, failing, good=gain > least)
+                    model, missed, tried = self.model(), None, []
+                elif trial.short <= slack and predicted < options.decrease * self.at.cost:
+                    break  # no smoother one is expected
+                else:
+                    model, missed, tried = self.corrected(trial, lengths, failing, (model, missed, tried))
+            since = 0 if self.at is not now else since + 1
+            if since > options.idle or self.trust.is_used_up(self.shaping(self.at.shortfalls > slack)):
+                break
+        self.at = best or self.at
+        return self.at.c if self.at.short <= slack else None
 
-    def accepts(self, short: float, gain: float) -> bool:
-        """Return whether a trial is better: smoother and within limits, much smoother and nearly so, or less short."""
-        options = self.options
-        if short <= options.slack and self.short <= options.slack:
-            return gain > 0.0
-        less = short <= max(options.slack, 0.5 * self.short)
-        return less or (short < options.shortfall and gain > options.saving * self.cost)
+    def taken(self, trial: Trial, predicted: float, *, again: bool) -> tuple[Trial | None, Bools]:
+        """Return the trial, or the part of it that holds, if it is better; and the coefficients (K,) that fail.
 
-    def values(self, c: Floats, rows: Ints) -> Floats:
-        """Return the margins (n, M) at waypoints `rows`; the last one is of the limit of the axes, if there is one."""
-        leans, samples = self.spline.leans(c, rows), self.problem.samples
-        margins = self.problem.values_of(self.start.margins, self.start.transform, leans, rows)
-        inside = samples.inside(lean(samples.nominal[rows], leans), rows)
-        return margins if inside is None else np.column_stack([margins, self.keep + inside])
-
-    def model(self) -> _Model:
-        """Return the linear model of the margins near the one to keep, and of those that have been short."""
-        spline, c = self.spline, self.c
-        near = (self.margins < self.keep + self.options.near) | self.violated
-        looked = np.flatnonzero(near.any(axis=1))
-        near, rows = near[looked], self.rows[looked]
-        self.kinds |= near.any(axis=0)  # once in, always in: making their function takes longer than calling it
-        kinds = np.flatnonzero(self.kinds)
-        slopes = spline.cone * self.slopes_at(kinds, spline.cone * (spline.basis[rows] @ c), rows)
-        values = self.margins[np.ix_(looked, kinds)]
-        reached = values < self.keep + self.options.spare + self.radius * np.linalg.norm(slopes, axis=2)
-        point, kind = np.nonzero(near[:, kinds] & reached)
-        return _Model(c, looked[point], rows[point], kinds[kind], values[point, kind], slopes[point, kind])
-
-    def slopes_at(self, kinds: Ints, leans: Floats, rows: Ints) -> Floats:
-        """Return the derivatives (n, K, 2) of these margins by leans (n, 2) in the frames at waypoints `rows`."""
-        start, frames = self.start, self.spline.frames[rows]
-        plain = tuple(kinds[kinds < len(start.margins.limits)].tolist())
-        if plain not in self.slopes:
-            self.slopes[plain] = lean_slopes(self.problem, start.margins, start.transform, plain)
-        slopes = self.slopes[plain](frames, leans, rows)
-        if len(plain) < len(kinds):  # the last one is of the limit of the axes
-            slopes = np.concatenate([slopes, self.problem.samples.inside_by_lean(frames, leans, rows)[:, None]], axis=1)
-        return slopes
-
-    def program(self, model: _Model, missed: Floats | None, tried: list[Floats] | None) -> BandedQP:
-        """Return the convex program around a model.
-
-        missed: see `_Model.missed`; tried: coefficients at which the penalty is evaluated, besides the model's; None
-        for no penalty.
+        predicted: decrease of the cost. again: whether the program was corrected by the errors of the model already.
         """
-        self.programs += 1
-        self.progress("tool axis", 0.0, f"smoothing, step {self.programs}")
-        spline = self.spline
-        touched, point = np.unique(model.rows, return_inverse=True)
-        basis = spline.basis[touched]
-        here = (model.slopes * (basis @ model.c)[point]).sum(axis=1)
-        upper = model.values - self.keep - here - (0.0 if missed is None else missed)
-        soft = NO_ROWS if tried is None else self.objective.excess(model.c, *tried)
-        # Where the penalty is much larger than the spline's own cost, the accuracy is relative to both.
-        scale = max(float(np.sqrt(spline.cost_of(model.c) * self.cost)), 1e-9)
-        return BandedQP(
-            spline.hessian, spline.gradient, scale, basis, point, -model.slopes, upper, model.c, self.radius, soft,
-            self.accuracy,
-        )  # fmt: skip
+        if self.accepts(trial):
+            return trial, np.zeros(len(trial.c), dtype=np.bool_)
+        failing = self.failing(trial)
+        if trial.short <= self.options.slack:
+            return None, failing
+        part, failing = self.where_it_holds(trial, failing)
+        enough = again or self.at.cost - part.cost > self.options.most * predicted
+        return part if enough and self.accepts(part) else None, failing
+
+    def corrected(
+        self, trial: Trial, lengths: Floats, failing: Bools, last: tuple[MarginModel, Floats | None, list[Floats]]
+    ) -> tuple[MarginModel, Floats | None, list[Floats]]:
+        """Return model, errors and tried coefficients of the program after a trial that was not taken.
+
+        It is corrected once by the errors of the margins, and once by the penalty at the trial. Then trust shrinks.
+        """
+        model, missed, tried = last
+        if trial.short > self.options.slack:
+            if missed is None:
+                model = self.model()
+                return model, model.missed(self.programs.spline, trial), tried
+            self.trust.shrink(lengths, failing)
+        elif not tried:
+            return model, missed, [trial.c]
+        else:
+            self.trust.shrink(np.full(len(lengths), lengths.max()))
+        return model, None, tried
+
+    def shaping(self, short: Bools) -> Bools:
+        """Return the coefficients (K,) that shape active waypoints `short` (n,); all where there are none."""
+        if not short.any():
+            return np.ones(len(self.at.c), dtype=np.bool_)
+        return shaped_by(self.programs.spline.basis[self.rows], short)
+
+    def failing(self, trial: Trial) -> Bools:
+        """Return the coefficients (K,) at waypoints where a trial is short, and not much less so than now."""
+        self.violated |= trial.margins < self.keep
+        short = trial.shortfalls > np.maximum(self.options.less * self.at.shortfalls, self.options.slack)
+        return shaped_by(self.programs.spline.basis[self.rows], short)
+
+    def where_it_holds(self, trial: Trial, failing: Bools) -> tuple[Trial, Bools]:
+        """Return a trial without its steps where margins get too small, and the coefficients (K,) that fail."""
+        part, worse, basis = trial, np.zeros(len(failing), dtype=np.bool_), self.programs.spline.basis[self.rows]
+        for _ in range(self.options.tries):
+            short = part.shortfalls > np.maximum(self.at.shortfalls, self.options.slack)
+            if not short.any():
+                break
+            worse |= shaped_by(basis, short)
+            part = self.programs.between(self.at, trial, self.trust.away_from(worse), self.rows)
+            self.violated |= part.margins < self.keep
+        return part, failing | worse
+
+    def accepts(self, trial: Trial) -> bool:
+        """Return whether a trial is better: smoother and within limits, much smoother and nearly so, or less short."""
+        options, now, gain = self.options, self.at, self.at.cost - trial.cost
+        if max(trial.short, now.short) <= options.slack:
+            return gain > 0.0
+        if trial.short <= max(options.slack, 0.5 * now.short):
+            return True
+        before, after = (float(np.maximum(each.shortfalls, 0.0).sum()) for each in (now, trial))
+        less = trial.short <= now.short and after <= options.less * before
+        return less or (trial.short < options.shortfall and gain > options.saving * now.cost)
+
+    def model(self) -> MarginModel:
+        """Return the linear model at the present coefficients."""
+        return self.programs.model(self.at, self.violated, self.rows, self.trust.radii)
+
+    def next_program(self, model: MarginModel, missed: Floats | None, tried: list[Floats] | None) -> BandedQP:
+        """Return the next convex program; the arguments as for `AxisPrograms.program`."""
+        self.solved += 1
+        self.progress("tool axis", 0.0, f"smoothing, step {self.solved}")
+        return self.programs.program(
+            self.at, model, self.trust.radii, missed, tried, self.accuracy, elastic=self.elastic
+        )
