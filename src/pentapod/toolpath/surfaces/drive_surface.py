@@ -28,6 +28,7 @@ from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.surfaces.ball_centres import BallCentres, smoothed
 from pentapod.toolpath.surfaces.options import DriveOptions
 from pentapod.toolpath.surfaces.rolled_surface import RolledSurface
+from pentapod.toolpath.surfaces.shade import out_of_the_shade
 from pentapod.toolpath.surfaces.tight_channels import has_tight_channels
 from pentapod.toolpath.surfaces.unreached import nearest_to_unreached
 
@@ -121,7 +122,7 @@ class DriveSurface(RolledSurface):
         """Return the part of the drive surface from which the ball touches a region; empty where there is none.
 
         A region that reaches a right angle reaches a little further, so that rounding does not split walls. Around an
-        open border the ball does not roll.
+        open border the ball does not roll. What lies far in the shade is left out.
         """
         patch = Patch.whole(self.mesh)
         if region.box is not None:
@@ -129,7 +130,9 @@ class DriveSurface(RolledSurface):
                 for axis in range(3):
                     contacts = self.contacts(patch.vertices)
                     patch, _ = patch.above(side * (contacts[:, axis] - bound[axis]), 0.0)
-        patch = self._facing(patch, region)
+        patch, overhangs = self._facing(patch, region), self.options.overhangs
+        hidden = self.hides(patch.vertices[patch.faces].mean(axis=1), overhangs.shade * self.radius)
+        patch = out_of_the_shade(patch, hidden, overhangs.beyond * self.radius)
         if self.part.topology.watertight:
             return patch
         beyond = self._beyond_border(patch)

@@ -17,7 +17,8 @@ class OverhangOptions(Value):
     beside, sideways: distances around the point, shares, at both of which the surface must be above it; above: by which
     height, a share: walls, and valleys between steep flanks, do not hide themselves, nor do walls that lean under by
     less. under: the same as `sideways` for links, which may lead a little farther; upright: and for those between ends
-    over which nothing leans.
+    over which nothing leans. shade: height, a share, by which it must be above what is left out of a patch; beyond: how
+    far a patch goes into the shade, at least.
     """
 
     beside: float = 0.01
@@ -25,6 +26,8 @@ class OverhangOptions(Value):
     under: float = 0.3
     upright: float = 0.01
     above: float = 0.2
+    shade: float = 0.5
+    beyond: float = 1.0
 
     def leaning(self, share: float) -> OverhangOptions:
         """Return options by which the surface may lean over a point by a share of the radius."""
