@@ -242,7 +242,7 @@ def _refusal(toolpath: Toolpath, own: OwnLeans) -> UnplacedPath:
     """Return why a path does not fit at the best placement found; what fits as it leans there needs no other tilts."""
     problem, best = own.problem, own.at
     # Where each fits by itself, no smooth leans were found.
-    posed = _posed(problem, best, own.field if own.fit else own.mixed)
+    posed = _posed(problem, best, own.nearest if own.fit and problem.samples.tilt > 0.0 else own.mixed)
     attempt, values = _with_margins(toolpath, problem, best, "best attempt", posed), posed[-1]
     if not own.fit:
         values[own.rows] = own.margins

@@ -12,6 +12,7 @@ import pytest
 from pentapod.base.progress import silent
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
+from pentapod.kinematics.component import Component
 from pentapod.planning import PlacedPath, PlacementConstraints, plan
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.placement import own_leans
@@ -318,3 +319,31 @@ def test_what_does_not_fit_by_itself_is_refused_by_name(desk, here):
     own = OwnLeans.of(problem, problem.candidate(problem.margins[0], here, problem.upright))
     assert not own.fit
     assert own.along_path() is None
+
+
+@dataclass(frozen=True)
+class Flip(Sway):
+    """The axis has to lean to one side on a pass, and to the other on the next one; `wave`: metres between them."""
+
+    def margin(self, pose):
+        turn = np.pi * (pose.tip[1] - self.middle) / self.wave
+        wanted = np.sign(np.sin(turn)) if isinstance(turn, np.ndarray) else ca.sign(ca.sin(turn))
+        return 1.0 - (pose.axis[0] - self.height * wanted) ** 2 / self.off**2
+
+
+def test_a_refusal_names_the_places_where_leans_that_turn_evenly_do_not_fit(desk, here):
+    """On every other pass the field leans to the wrong side; the axis cannot turn at once at the ends alone."""
+    passes, along, apart = 6, 100, 1e-4
+    x = np.linspace(-0.015, 0.015, along)
+    rows = [np.c_[x[:: 1 - 2 * (k % 2)], np.full(along, (k + 0.5) * apart), np.zeros(along)] for k in range(passes)]
+    tips = np.concatenate(rows)
+    path = Toolpath((Segment(SegmentKind.CUT, tips, np.tile([0.0, 0.0, 1.0], (len(tips), 1)), 0.02),), 0.003)
+    flip = Flip(float(here.translation[1]), apart, 0.03, height=0.15)
+    asked = {**options(desk, here, 0.03), "limits": (LimitKind(lambda _: [flip]),), "component": Component(1, 1)}
+    answer = plan(path, desk, **asked)
+    assert isinstance(answer, UnplacedPath)
+    (only,) = answer.diagnosis
+    short = np.concatenate([np.arange(first, last + 1) for first, last in only.waypoints])
+    assert 0 < len(short) < 60
+    assert np.abs(tips[short, 0]).min() > 0.01
+    assert (answer.attempt.margins.min(axis=1) < NEEDED_MARGIN).sum() == len(short)

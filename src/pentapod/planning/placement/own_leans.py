@@ -130,6 +130,14 @@ class OwnLeans:
         found[self.rows] = self.leans
         return found
 
+    @property
+    def nearest(self) -> Floats:
+        """The leans (N, 3) of the field, or of the spline through even ones: those that fit at more waypoints."""
+        spline = AxisSpline.of(self.problem.samples, self.problem.cone)
+        even = spline.leans(spline.fitted(self.even.leans))
+        field, other = ((self._values(each) < NEEDED_MARGIN).sum() for each in (self.field, even))
+        return self.field if field <= other else even
+
     def along_path(self, progress: Progress = silent) -> Floats | None:
         """Return the leans (N, 3) of a smooth spline that was found to keep the needed margin; None without."""
         if not self.fit or self.problem.samples.tilt == 0.0:
