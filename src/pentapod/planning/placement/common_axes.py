@@ -109,7 +109,7 @@ def with_common_axis(
         best = max(best, found[-1][1][1].best.smallest)
         if found[-1][1][1].interrupted:
             break
-    found.sort(key=lambda pair: -pair[1][1].best.smallest)
+    found.sort(key=lambda pair: pair[1][0].rank(pair[1][1].best), reverse=True)
     done: list[Searched] = []
     for whole, few in found:
         best = max((each[1].best.smallest for each in done), default=-np.inf)

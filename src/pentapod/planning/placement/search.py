@@ -127,7 +127,7 @@ def search(
                 break
             found = improver.raise_margin(first_candidate(problem, margins, transform, gaps), others=others)
             others.append(found)
-            best = found if best is None or found.smallest > best.smallest else best
+            best = found if best is None or problem.rank(found) > problem.rank(best) else best
             tried += 1
             note = f"component {best.margins.scene.branch}, best margin so far {best.smallest:.3f}"
             progress("placement", tried / count, note)

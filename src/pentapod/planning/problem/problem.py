@@ -17,7 +17,7 @@ from pentapod.planning.limits.margins import Margins
 from pentapod.planning.problem.constraints import FREE, PlacementConstraints
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import FieldDomain, lean
-from pentapod.planning.problem.weights import EVEN, Weights, weighed
+from pentapod.planning.problem.weights import EVEN, NEEDED_MARGIN, Weights, weighed
 
 CONE_SHARE = 0.98
 """Share of the tilt cone used by the optimisers; the rest absorbs what happens between waypoints."""
@@ -165,6 +165,17 @@ class PlacementProblem:
     def within_cone(self, coefficients: Floats) -> Floats:
         """Return coefficients scaled down until every waypoint keeps the cone; a lean is linear in them."""
         return coefficients / max(1.0, float(self.steepness(coefficients).max(initial=0.0)))
+
+    def rank(self, at: Candidate) -> tuple[float, float]:
+        """Return what candidates are compared by: whether the machine by itself keeps its limits, then the margin.
+
+        Of two that do not fit, one at which only bodies touch is nearer to a plan than one in a wrong branch, though
+        the tool may be deeper in the part there than that one's legs are too short.
+        """
+        if at.smallest >= NEEDED_MARGIN:
+            return NEEDED_MARGIN, at.smallest
+        poses = self.samples.machine_poses(at.transform, self.axes(at.coefficients))
+        return min(float(at.margins.least_own(*poses).min()), NEEDED_MARGIN), at.smallest
 
     def candidate(self, margins: Margins, transform: RigidTransform, coefficients: Floats) -> Candidate:
         """Return the candidate with its smallest margin over all waypoints."""
