@@ -20,5 +20,5 @@ def out_of_the_shade(patch: Patch, hidden: Bools, reach: float) -> Patch:
     cell -= cell.min(axis=0)
     free = np.zeros(cell.max(axis=0) + 1, dtype=np.bool_)
     free[tuple(cell[~hidden].T)] = True
-    near = binary_dilation(free, np.ones((3, 3, 3), dtype=np.bool_))[tuple(cell.T)]
+    near: Bools = binary_dilation(free, np.ones((3, 3, 3), dtype=np.bool_))[tuple(cell.T)]
     return patch if near.all() else patch.only(near)
