@@ -41,6 +41,14 @@ def test_facets_far_from_all_that_can_be_machined_are_left_out():
     assert 0.0102 + 3e-3 - 1e-3 < middles(kept)[:, 0].max() < 0.0102 + 6e-3
     assert out_of_the_shade(patch, np.zeros_like(hidden), 3e-3) is patch
     assert out_of_the_shade(patch, np.arange(len(x)) % 7 == 0, 3e-3) is patch
+    assert out_of_the_shade(patch, np.ones_like(hidden), 3e-3) is patch
+
+
+def test_a_large_part_and_a_small_ball_need_no_grid():
+    vertices, faces = flat(40, 1e-3)
+    patch = Patch.whole(Mesh.of(1e3 * vertices + [0.0, 0.0, 1e4], faces))
+    hidden = middles(patch)[:, 0] > 20.5
+    assert 0 < len(out_of_the_shade(patch, hidden, 1e-2).faces) == (~hidden).sum()
 
 
 def flat(count, step):

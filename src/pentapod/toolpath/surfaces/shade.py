@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import binary_dilation
+from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools
 from pentapod.mesh.patch import Patch
@@ -12,13 +12,14 @@ from pentapod.mesh.patch import Patch
 def out_of_the_shade(patch: Patch, hidden: Bools, reach: float) -> Patch:
     """Return a patch without its hidden facets (F,), but for those near others: `reach` to twice that, metres.
 
-    So it ends where nothing can be machined, and lines beside what can be are as they were.
+    So it ends where nothing can be machined. A patch all of which is hidden is returned as it is.
     """
-    if not hidden.any():
+    if not hidden.any() or hidden.all():
         return patch
-    cell = np.floor(patch.vertices[patch.faces].mean(axis=1) / reach).astype(np.intp)
+    cell = np.floor(patch.vertices[patch.faces].mean(axis=1) / reach).astype(np.int64)
     cell -= cell.min(axis=0)
-    free = np.zeros(cell.max(axis=0) + 1, dtype=np.bool_)
-    free[tuple(cell[~hidden].T)] = True
-    near: Bools = binary_dilation(free, np.ones((3, 3, 3), dtype=np.bool_))[tuple(cell.T)]
+    packed = np.ravel_multi_index(tuple(cell.T), tuple((cell.max(axis=0) + 1).tolist()))
+    _, first, which = np.unique(packed, return_index=True, return_inverse=True)
+    cells, free = cell[first], np.bincount(which[~hidden], minlength=len(first)) > 0
+    near = np.asarray(KDTree(cells[free]).query(cells, p=np.inf, distance_upper_bound=1.5)[0])[which] < np.inf
     return patch if near.all() else patch.only(near)
