@@ -97,12 +97,17 @@ def plan(
     )  # fmt: skip
 
     def path(problem: PlacementProblem, at: Candidate, leans: Floats, chosen_by: str) -> PlacedPath:
-        def met(leans: Floats) -> Ranges:
-            return () if meetings is None else meetings(_path(toolpath, problem, at, leans, chosen_by))
+        if meetings is None or problem.samples.tilt == 0.0:
+            return _path(toolpath, problem, at, leans, chosen_by)
+        # Margins and meetings of a long path take seconds: the path that was looked at is the one returned.
+        made, meet = list[tuple[Floats, PlacedPath]](), meetings
 
-        if problem.samples.tilt > 0.0:
-            leans = clear_between(problem, at, leans, met, progress)
-        return _path(toolpath, problem, at, leans, chosen_by)
+        def met(leans: Floats) -> Ranges:
+            made.append((leans, _path(toolpath, problem, at, leans, chosen_by)))
+            return meet(made[-1][1])
+
+        found = clear_between(problem, at, leans, met, progress)
+        return next(placed for leans, placed in made if leans is found)
 
     def planned(rows: Ints) -> PlacedPath | Refusal:
         problem = whole.at(rows)

@@ -1,5 +1,6 @@
 """Leans whose tool is clear between waypoints: those beside a place where it is not get more room."""
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from pentapod.planning.placement.between import OPTIONS, clear_between
 from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
+from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 COUNT = 120
 
@@ -88,3 +90,17 @@ def test_room_is_added_beside_the_places_and_grows(along_a_wall, monkeypatch):
     assert spares[2][:3].tolist() == [OPTIONS.first] * 3
     assert spares[2][50] == spares[1][50]
     assert replace(problem, spare=spares[0]).spare is spares[0]
+
+
+def test_a_plan_whose_tool_is_clear_is_placed_and_looked_at_once(desk, monkeypatch):
+    """Margins and meetings of a long path take seconds; whoever asked gets the very path that was looked at."""
+    planner = importlib.import_module("pentapod.planning.plan")
+    made, looked, path = [], [], planner._path
+    monkeypatch.setattr(planner, "_path", lambda *given: made.append(path(*given)) or made[-1])
+    here = RigidTransform(np.diag([1.0, -1.0, -1.0]), desk.work.centre)
+    tips = np.c_[np.linspace(-0.02, 0.02, 40), np.zeros((40, 2))]
+    line = Toolpath((Segment(SegmentKind.CUT, tips, np.tile([0.0, 0.0, 1.0], (40, 1)), 0.02),), 0.003)
+    asked = {"tilt": 0.2, "constraints": PlacementConstraints.fixture([here])}
+    placed = planner.plan(line, desk, meetings=lambda each: looked.append(each) or (), **asked)
+    assert len(made) == len(looked) == 1
+    assert placed is looked[0] is made[0]

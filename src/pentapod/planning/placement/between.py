@@ -47,15 +47,17 @@ def clear_between(
     meetings: returns the ranges of waypoints, inclusive, between which the tool meets the part. Where it does so with
     all leans that are found, those are returned with which it does at the fewest waypoints.
     """
-    options, spare = OPTIONS, np.zeros(len(leans))
-    smallest = float(problem.values_of(at.margins, at.transform, leans).min())
-    keep, found, best, fewest = float(np.clip(smallest, ENOUGH, asked())), leans, leans, np.inf
+    options, spare, keep = OPTIONS, np.zeros(len(leans)), 0.0
+    found, best, fewest = leans, leans, np.inf
     for k in range(options.rounds + 1):
         met = meetings(found)
         if (count := sum(last - first for first, last in met)) < fewest:
             best, fewest = found, count
         if not met or k == options.rounds:
             break
+        if k == 0:
+            smallest = float(problem.values_of(at.margins, at.transform, leans).min())
+            keep = float(np.clip(smallest, ENOUGH, asked()))
         short = np.zeros(len(leans), dtype=np.bool_)
         for first, last in met:
             short[max(first - options.beside, 0) : last + options.beside + 1] = True

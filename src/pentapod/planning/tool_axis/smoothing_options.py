@@ -22,12 +22,12 @@ class SmoothingOptions:
     a share of the relative decrease of the step before.
 
     shortfall, saving: a step whose margin is short by less than `shortfall` is accepted if it saves the share `saving`
-    of the cost; the next step restores the margin. less: a step is accepted that is nowhere shorter than the present
-    coefficients at most, and leaves this share of what all waypoints are short of. good: ratio of actual to predicted
-    decrease from which the trust region is doubled; next_radius: the least of it, as a share of the cone, for another
-    margin to keep. most: a step that holds on a part of the path is taken at once if it brings this share of the
-    predicted decrease; tries: how often that part is made smaller. back: programs after the last step that restore the
-    margin. idle: programs in a row after which the iteration stops if none of their steps was taken.
+    of the cost; the next step restores the margin. less: so is one whose largest shortfall does not grow, if the sum of
+    all shortfalls falls to this share. good: ratio of actual to predicted decrease from which the trust region is
+    doubled; next_radius: the least of it, as a share of the cone, for another margin to keep. most: a step that holds
+    on a part of the path is taken at once if it brings this share of the predicted decrease; tries: how often that part
+    is made smaller. back: programs after the last step that restore the margin. idle: programs in a row after which the
+    iteration stops if none of their steps was taken.
 
     levels: steps in which given leans come up to the margin to keep; enough: share of it that is enough where they come
     up no farther; far: all waypoints within this distance of it are active then.
