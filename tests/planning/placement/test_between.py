@@ -75,15 +75,17 @@ def test_where_none_are_clear_the_fewest_waypoints_count(along_a_wall, monkeypat
 
     assert clear_between(problem, at, leans, meetings) is seen[1]
     assert len(seen) == OPTIONS.rounds + 1
-    # Nor are others looked for where the spline finds none.
-    monkeypatch.setattr(between, "along_spline", lambda *_: None)
+    # Nor are others looked for where the margin at waypoints would be lost.
+    beside = leans + np.array([0.0, 0.2, 0.0])
+    assert room(problem, at, beside).min() < 0.0
+    monkeypatch.setattr(between, "restored_along_spline", lambda *_: beside)
     assert clear_between(problem, at, leans, lambda _: met[0]) is leans
 
 
 def test_room_is_added_beside_the_places_and_grows(along_a_wall, monkeypatch):
     problem, at, leans = along_a_wall
     spares = []
-    monkeypatch.setattr(between, "along_spline", lambda there, *_: spares.append(there.spare) or leans)
+    monkeypatch.setattr(between, "restored_along_spline", lambda there, *_: spares.append(there.spare) or leans)
     clear_between(problem, at, leans, lambda _: ((50, 52),) if len(spares) < 2 else ((0, 1),))
     assert [np.flatnonzero(each).tolist() for each in spares[:2]] == [[49, 50, 51, 52, 53]] * 2
     assert spares[1].max() == OPTIONS.more * spares[0].max() == OPTIONS.more * OPTIONS.first

@@ -26,6 +26,7 @@ from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.problem.weights import NEEDED_MARGIN
 from pentapod.planning.tool_axis.axis_programs import AxisPrograms
+from pentapod.planning.tool_axis.restoration import restored_everywhere
 from pentapod.planning.tool_axis.smoothing import _Smoothing, smoothed
 from pentapod.planning.tool_axis.smoothing_options import OPTIONS as SMOOTHING
 from pentapod.planning.tool_axis.spline import AxisSpline, stations_of
@@ -168,24 +169,11 @@ def test_a_part_of_the_margin_is_enough_where_no_spline_comes_up_to_it(keep, at_
         assert kept <= keep + 1e-3
 
 
-def test_leans_come_up_farther_where_margins_that_pull_apart_may_stay_short(desk, here, monkeypatch):
-    """With all margins asked for, the search ended at 0.287: to first order two of them cannot come up together."""
-    asked = options(desk, here, 0.02)
-    samples = ToolpathSamples.of(zigzag(), TILT)
-    problem = PlacementProblem.of(samples, desk, asked["constraints"], limits=asked["limits"])
-    start = problem.candidate(problem.margins[0], here, problem.upright)
-    leans = OwnLeans.of(problem, start).mixed
-    reached = smallest(problem, start, smoothed(problem, start, 0.5, leans=leans))
-    program = AxisPrograms.program
-    monkeypatch.setattr(AxisPrograms, "program", lambda *given, elastic: program(*given, elastic=False))
-    assert reached > 1.15 * smallest(problem, start, smoothed(problem, start, 0.5, leans=leans))
-
-
 def test_leans_that_fall_short_at_some_places_go_back_to_those_that_do_not_there(swaying):
     problem, start, leans = swaying
-    run = _Smoothing(AxisPrograms(problem, start, SMOOTHING), 0.1, silent, leans)
-    assert run.approached() == 0.1
-    begun = run.at.c.copy()
+    programs = AxisPrograms(problem, start, SMOOTHING)
+    begun, margins = restored_everywhere(programs, programs.spline.fitted(leans), 0.1)
+    run = _Smoothing(programs, 0.1, silent, begun, margins, own=True)
     smooth = run.smoothest()
     spoilt = smooth.copy()
     spoilt[20:24, 0] += 0.5
@@ -197,13 +185,11 @@ def test_leans_that_fall_short_at_some_places_go_back_to_those_that_do_not_there
     assert run.at.cost < run.trial(begun).cost
 
 
-def test_where_the_smoothest_leans_are_not_found_the_first_that_fit_count(swaying, monkeypatch):
+def test_where_no_smoother_leans_are_found_the_first_that_fit_count(swaying):
     """They are rougher, but keep the margin at all waypoints."""
     problem, start, leans = swaying
-    once = replace(SMOOTHING, levels=1)
-    smooth, search = smoothed(problem, start, 0.1, once, leans=leans), _Smoothing.smoothest
-    monkeypatch.setattr(_Smoothing, "smoothest", lambda run, *, first=False: search(run, first=True) if first else None)
-    found = smoothed(problem, start, 0.1, once, leans=leans)
+    smooth = smoothed(problem, start, 0.1, leans=leans)
+    found = smoothed(problem, start, 0.1, replace(SMOOTHING, steps=0), leans=leans)
     spline = AxisSpline.of(problem.samples, problem.cone)
     assert smallest(problem, start, found) >= 0.1 - SMOOTHING.slack
     assert spline.cost_of(found) > 1.5 * spline.cost_of(smooth)
@@ -281,13 +267,6 @@ def test_no_lean_of_a_grid_beyond_the_limit_of_the_axes_is_chosen(beyond):
     np.testing.assert_array_equal(np.isneginf(choice.smallest), outside)
     _, best = best_tilted_margins(samples, start.margins, start.transform)
     assert samples.inside(lean(samples.nominal, best)).min() >= 0.0
-
-
-def test_the_limit_of_the_axes_does_not_follow_the_margin_that_is_aimed_at(beyond):
-    problem, start, leans = beyond
-    run = _Smoothing(AxisPrograms(problem, start, SMOOTHING), 0.1, silent, leans)
-    run.aim(0.3)
-    np.testing.assert_allclose(run.at.margins, run.trial(run.at.c).margins)
 
 
 @pytest.mark.parametrize(("degrees", "limit"), [(0.0, 90.0), (78.0, 90.0), (78.0, 78.5)])

@@ -1,15 +1,14 @@
-"""Programs of the smoothing: parts of a step, and margins that may stay short."""
+"""Programs of the smoothing: parts of a step, and what shapes what."""
 
 import numpy as np
 import pytest
 
 from pentapod.geometry.rigid import RigidTransform
-from pentapod.numerics.convex.banded_qp import NO_ROWS
 from pentapod.planning.limits.limit import LimitKind
 from pentapod.planning.problem.constraints import PlacementConstraints
 from pentapod.planning.problem.problem import PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
-from pentapod.planning.tool_axis.axis_programs import AxisPrograms, shaped_by, shapes, soft_rows
+from pentapod.planning.tool_axis.axis_programs import AxisPrograms, shaped_by, shapes
 from pentapod.planning.tool_axis.smoothing_options import OPTIONS
 
 
@@ -67,45 +66,3 @@ def test_rows_and_the_coefficients_that_shape_them(programs):
     np.testing.assert_array_equal(shapes(basis, of), dense[:, of].any(axis=1))
     rows = np.arange(200) % 50 == 7
     np.testing.assert_array_equal(shaped_by(basis, rows), dense[rows].any(axis=0))
-
-
-def test_soft_rows_are_the_same_inequalities(programs):
-    basis, rng = programs.spline.basis[::7], np.random.default_rng(3)
-    slopes, upper = rng.normal(size=(basis.shape[0], 2)), rng.normal(size=basis.shape[0])
-    soft = NO_ROWS.and_more(soft_rows(basis, slopes, upper, 4.0))
-    c = some(programs, 4)
-    x = np.append(c.ravel(), np.zeros(soft.windows.shape[1]))
-    left = [window @ x[first : first + len(window)] for window, first in zip(soft.windows, soft.starts, strict=True)]
-    np.testing.assert_allclose(left, (slopes * (basis @ c)).sum(axis=1), atol=1e-12)
-    both = soft.and_more(soft)
-    assert len(both.upper) == len(both.windows) == 2 * len(upper)
-    np.testing.assert_array_equal(both.weight, 4.0)
-
-
-def pulled_apart(programs, c, *, elastic):
-    """The program in which the axis should lean both ways along y at the same waypoint."""
-    rows = np.arange(200)
-    at = programs.trial(c, rows, 0.7)
-    model = programs.model(at, np.zeros_like(at.margins, dtype=np.bool_), rows, np.full(len(c), 0.5))
-    model.slopes[1::2] *= -1.0
-    return programs.program(at, model, np.full(len(c), 0.5), None, None, 1e-3, elastic=elastic)
-
-
-def test_margins_that_pull_apart_have_a_solution_where_they_may_stay_short(programs):
-    c = np.zeros((programs.spline.basis.shape[1], 2))
-    assert pulled_apart(programs, c, elastic=False).solved() is None
-    found = pulled_apart(programs, c, elastic=True).solved()
-    assert found is not None
-    assert np.abs(found[:, 1]).max() < 0.2
-
-
-def test_more_is_not_asked_of_a_margin_than_the_trust_region_allows(programs):
-    """Half of it at least: what is asked has a solution, and the next program goes on from there."""
-    c, rows = np.tile([0.3, 0.0], (programs.spline.basis.shape[1], 1)), np.arange(200)
-    at, radii = programs.trial(c, rows, 0.25), np.full(len(c), 0.01)
-    assert at.margins.argmin(axis=1).tolist() == [programs.start.margins.limits.index(UPRIGHT)] * 200
-    model = programs.model(at, np.zeros_like(at.margins, dtype=np.bool_), rows, radii)
-    found = programs.program(at, model, radii, None, None, 1e-6, elastic=False).solved()
-    assert found is not None
-    there, most = programs.trial(found, rows, 0.25), 3.0 * programs.spline.cone * 0.01
-    assert at.short - most < there.short < at.short - 0.4 * most

@@ -42,11 +42,13 @@ def test_a_step_comes_back_to_its_full_length_beside_the_places(failing):
     assert (TrustRegion.of(100).away_from(failing & ~failing) == 1.0).all()
 
 
-def test_it_is_used_up_where_the_places_that_matter_may_not_move(failing):
+def test_it_is_used_up_where_no_coefficient_may_move(failing):
     trust = TrustRegion.of(100)
     for _ in range(9):
         trust.shrink(at=failing)
-    assert trust.is_used_up(failing)
-    assert not trust.is_used_up(np.ones(100, dtype=np.bool_))
-    trust.widen(0.5)
-    assert trust.radii.min() == 0.5
+    assert not trust.is_used_up()
+    for _ in range(9):
+        trust.shrink()
+    assert trust.is_used_up()
+    trust.widen()
+    assert not trust.is_used_up()

@@ -38,16 +38,6 @@ class SoftRows:
     upper: Floats
     weight: Floats
 
-    def and_more(self, others: SoftRows) -> SoftRows:
-        """Return these inequalities and others."""
-        if not len(self.upper):
-            return others
-        both = (
-            np.concatenate([getattr(each, name) for each in (self, others)])
-            for name in ("windows", "starts", "upper", "weight")
-        )
-        return SoftRows(*both)
-
 
 NO_ROWS = SoftRows(np.zeros((0, 1)), np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))
 

@@ -13,8 +13,9 @@ import numpy as np
 
 from pentapod.base.arrays import Floats
 from pentapod.base.progress import Progress, silent
-from pentapod.planning.placement.own_leans import ENOUGH, QUICKLY, along_spline, asked
+from pentapod.planning.placement.own_leans import ENOUGH, asked, restored_along_spline
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
+from pentapod.planning.tool_axis.smoothing_options import OPTIONS as SMOOTHING
 
 Ranges = Sequence[tuple[int, int]]
 
@@ -62,8 +63,8 @@ def clear_between(
         for first, last in met:
             short[max(first - options.beside, 0) : last + options.beside + 1] = True
         spare = np.where(short, np.maximum(options.first, options.more * spare), spare)
-        again = along_spline(replace(problem, spare=spare), at, keep, found, progress, QUICKLY)
-        if again is None:
+        again = restored_along_spline(replace(problem, spare=spare), at, keep, found, progress)
+        if problem.values_of(at.margins, at.transform, again).min() < ENOUGH - SMOOTHING.slack:
             break
         found = again
     return best

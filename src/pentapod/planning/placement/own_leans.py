@@ -23,6 +23,8 @@ from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.problem.samples import ToolpathSamples
 from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.problem.weights import NEEDED_MARGIN
+from pentapod.planning.tool_axis.axis_programs import AxisPrograms
+from pentapod.planning.tool_axis.restoration import restored_everywhere
 from pentapod.planning.tool_axis.smoothing import smoothed
 from pentapod.planning.tool_axis.smoothing_options import OPTIONS as SMOOTHING
 from pentapod.planning.tool_axis.smoothing_options import SmoothingOptions
@@ -238,3 +240,12 @@ def along_spline(
     """Return leans (N, 3) of a smooth spline from given ones that keeps a margin, or a part of it; None without."""
     spline = smoothed(problem, at, keep, options, progress, leans)
     return None if spline is None else AxisSpline.of(problem.samples, problem.cone).leans(spline)
+
+
+def restored_along_spline(
+    problem: PlacementProblem, at: Candidate, keep: float, leans: Floats, progress: Progress
+) -> Floats:
+    """Return leans (N, 3) of a spline through given ones, changed where these do not keep a margin, or nearer to it."""
+    programs = AxisPrograms(problem, at, QUICKLY)
+    c, _ = restored_everywhere(programs, programs.spline.fitted(leans), keep, progress)
+    return programs.spline.leans(c)

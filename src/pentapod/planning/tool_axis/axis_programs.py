@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
-from pentapod.numerics.convex.banded_qp import NEIGHBOURS, NO_ROWS, BandedQP, SoftRows
+from pentapod.numerics.convex.banded_qp import NO_ROWS, BandedQP
 from pentapod.planning.problem.formulation import Slopes, lean_slopes
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.problem.tilt_field import lean
 from pentapod.planning.tool_axis.cost import AxisCost
 from pentapod.planning.tool_axis.smoothing_options import SmoothingOptions
-from pentapod.planning.tool_axis.spline import BANDS, AxisSpline
+from pentapod.planning.tool_axis.spline import AxisSpline
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,34 +40,19 @@ class Trial:
         """The largest shortfall."""
         return float(self.shortfalls.max())
 
-    def aimed_at(self, keep: float, *, own_limit: bool) -> Trial:
-        """Return the same for another margin to keep. own_limit: whether the last margin is the limit of the axes."""
-        margins = self.margins.copy()
-        if own_limit:
-            margins[:, -1] += keep - self.keep
-        return replace(self, margins=margins, keep=keep)
-
 
 @dataclass(frozen=True, eq=False)
 class MarginModel:
     """Margins near the one to keep, around coefficients c, to first order.
 
-    active, rows (R,): the waypoint, as index into the active ones and into all; kinds, values (R,): which margin, and
-    its value at c; slopes (R, 2): derivatives by the lean as a share of the cone.
+    rows, values (R,): the waypoint, and the value of a margin there at c; slopes (R, 2): its derivatives by the lean as
+    a share of the cone.
     """
 
     c: Floats
-    active: Ints
     rows: Ints
-    kinds: Ints
     values: Floats
     slopes: Floats
-
-    def missed(self, spline: AxisSpline, trial: Trial) -> Floats:
-        """Return the overestimates (R,) of the linear model at a trial."""
-        moved = (spline.basis @ (trial.c - self.c))[self.rows]
-        predicted = self.values + (self.slopes * moved).sum(axis=1)
-        return np.maximum(predicted - trial.margins[self.active, self.kinds], 0.0)
 
 
 class AxisPrograms:
@@ -93,9 +78,12 @@ class AxisPrograms:
         return Trial(c, self.values(c, rows, keep), self.objective.of(c), keep)
 
     def values(self, c: Floats, rows: Ints, keep: float) -> Floats:
-        """Return the margins (n, M) at waypoints `rows`; the last one is of the limit of the axes, if there is one."""
+        """Return the margins (n, M) at waypoints `rows`; the last one is of the limit of the axes, if there is one.
+
+        Those to obstacles that do not enter a program may be given smaller, which takes less time.
+        """
         leans, samples = self.spline.leans(c, rows), self.problem.samples
-        enough = keep + 2.0 * self.options.far
+        enough = keep + 1.2 * self.options.near
         margins = self.problem.values_of(self.start.margins, self.start.transform, leans, rows, enough)
         inside = samples.inside(lean(samples.nominal[rows], leans), rows)
         return margins if inside is None else np.column_stack([margins, keep + inside])
@@ -125,7 +113,7 @@ class AxisPrograms:
         values = margins[np.ix_(looked, kinds)]
         reached = values < at.keep + self.options.spare + (basis @ radii)[:, None] * np.linalg.norm(slopes, axis=2)
         point, kind = np.nonzero(near[:, kinds] & reached)
-        return MarginModel(at.c, looked[point], rows[point], kinds[kind], values[point, kind], slopes[point, kind])
+        return MarginModel(at.c, rows[point], values[point, kind], slopes[point, kind])
 
     def _slopes_at(self, kinds: Ints, leans: Floats, rows: Ints) -> Floats:
         """Return the derivatives (n, K, 2) of these margins by leans (n, 2) in the frames at waypoints `rows`."""
@@ -139,56 +127,24 @@ class AxisPrograms:
         return slopes
 
     def program(
-        self,
-        at: Trial,
-        model: MarginModel,
-        radii: Floats,
-        missed: Floats | None,
-        tried: list[Floats] | None,
-        accuracy: float,
-        *,
-        elastic: bool,
+        self, at: Trial, model: MarginModel, radii: Floats, tried: list[Floats] | None, accuracy: float
     ) -> BandedQP:
-        """Return the convex program around a model at a trial, within discs of the radii (K,).
+        """Return the convex program around a model at a trial that keeps the margin, within discs of the radii (K,).
 
-        missed: see `MarginModel.missed`; tried: coefficients at which the penalty is evaluated, besides the model's;
-        None for no penalty. elastic: whether margins that are short may stay so, at a price: where two of them pull
-        apart there is no solution otherwise.
+        tried: coefficients at which the penalty is evaluated, besides the model's; None for no penalty.
         """
-        spline, options = self.spline, self.options
+        spline = self.spline
         touched, point = np.unique(model.rows, return_inverse=True)
         basis = spline.basis[touched]
         here = (model.slopes * (basis @ model.c)[point]).sum(axis=1)
-        most = options.ask * (basis @ radii)[point] * np.linalg.norm(model.slopes, axis=1)
-        needed = np.minimum(at.keep - model.values + (0.0 if missed is None else missed), most)
-        upper, slopes = -needed - here, -model.slopes
+        # Margins that are short by rounding may stay so: two of them that pull apart would have no solution.
+        upper = np.maximum(model.values - at.keep, 0.0) - here
         soft = NO_ROWS if tried is None else self.objective.excess(model.c, *tried)
-        if elastic:
-            hard, short = np.flatnonzero(needed <= 0.0), np.flatnonzero(needed > 0.0)
-            price = at.cost / options.bearable**2
-            soft = soft.and_more(soft_rows(basis[point[short]], slopes[short], upper[short], price))
-            point, slopes, upper = point[hard], slopes[hard], upper[hard]
-        # Where the penalty is much larger than the spline's own cost, the accuracy is relative to both; where margins
-        # stay short at a price, to the whole.
-        own = at.cost if elastic else spline.cost_of(model.c)
-        scale = max(float(np.sqrt(own * at.cost)), 1e-9)
-        accuracy = options.rough if elastic else accuracy
+        # Where the penalty is much larger than the spline's own cost, the accuracy is relative to both.
+        scale = max(float(np.sqrt(spline.cost_of(model.c) * at.cost)), 1e-9)
         return BandedQP(
-            spline.hessian, spline.gradient, scale, basis, point, slopes, upper, model.c, radii, soft, accuracy
+            spline.hessian, spline.gradient, scale, basis, point, -model.slopes, upper, model.c, radii, soft, accuracy
         )
-
-
-def soft_rows(basis: Any, slopes: Floats, upper: Floats, weight: float) -> SoftRows:
-    """Return the inequalities slopes[r] · (basis @ c)[r] ≤ upper[r] as soft ones, all of a weight.
-
-    basis (R, K) sparse, four neighbours a row.
-    """
-    count = len(upper)
-    windows = np.zeros((count, BANDS))
-    by_lean = basis.data.reshape(count, NEIGHBOURS, 1) * slopes.reshape(count, 1, 2)
-    windows[:, : 2 * NEIGHBOURS] = by_lean.reshape(count, 2 * NEIGHBOURS)
-    starts = 2 * basis.indices[::NEIGHBOURS].astype(np.intp)
-    return SoftRows(windows, starts, upper, np.full(count, weight))
 
 
 def shapes(basis: Any, of: Bools) -> Bools:

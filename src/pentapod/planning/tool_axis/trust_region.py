@@ -43,13 +43,13 @@ class TrustRegion:
         """Return the largest one, for `count` coefficients."""
         return cls(np.full(count, OPTIONS.largest))
 
-    def is_used_up(self, at: Bools) -> bool:
-        """Return whether none of the coefficients `at` (K,) may move any more."""
-        return float(self.radii[at].max()) < self.options.least
+    def is_used_up(self) -> bool:
+        """Return whether none of the coefficients may move any more."""
+        return float(self.radii.max()) < self.options.least
 
-    def widen(self, least: float = 0.0) -> None:
-        """Double the radii, up to the largest; none stays below `least`."""
-        self.radii = np.clip(2.0 * self.radii, least, self.options.largest)
+    def widen(self) -> None:
+        """Double the radii, up to the largest."""
+        self.radii = np.minimum(2.0 * self.radii, self.options.largest)
 
     def limit(self, radius: float) -> None:
         """Let no radius be larger than `radius`, which counts as the least one if it is smaller."""
