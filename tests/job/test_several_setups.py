@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pentapod.base.errors import InputError, JobError
+from pentapod.base.refusal import Refusal, Shortfall
 from pentapod.cli.commands.new import dome_stl
 from pentapod.cli.main import run as command
 from pentapod.geometry.rigid import RigidTransform
@@ -23,6 +25,7 @@ from pentapod.report import write_report
 from pentapod.report.sheet import write_sheet
 from pentapod.toolpath import Toolpath
 from pentapod.toolpath.linking.partition import cutting_intervals
+from pentapod.toolpath.toolpath import Segment, SegmentKind
 from pentapod.view import open_run
 from pentapod.view.replan import replanned
 from pentapod.view.words import run_words
@@ -226,3 +229,39 @@ def test_one_fixed_placement_is_one_set_up(make_job):
     job = make_job(('mode = "fixed"', 'mode = "fixed"\nsetups = 2'))
     with pytest.raises(JobError, match="one fixed placement is one set-up"):
         Job.load(job)
+
+
+def test_set_ups_are_not_searched_for_where_they_do_not_help(job, tmp_path, monkeypatch):
+    monkeypatch.setattr(stages, "meets_wherever_it_stands", lambda *_: True)
+    monkeypatch.setattr(stages, "setups", lambda *_: pytest.fail("a partition is searched for"))
+    refusal = run(Job.load(job), tmp_path / "out", advice=None).refusal
+    assert refusal.cause.startswith(
+        "set-ups do not help, above its tip the tool touches the part, wherever that stands: "
+    )
+    assert json.loads((tmp_path / "out" / "verdict.json").read_text())["refusal"]["cause"] == refusal.cause
+
+
+@pytest.mark.parametrize(
+    ("limit", "waypoints", "tilt", "mode", "so"),
+    [
+        ("spindle touches the part", (14, 15), 0.0, "fixed", True),
+        ("tool body touches the part", (14, 15), 0.0, "normal", True),
+        ("spindle touches the part", (14, 15), 0.1, "normal", False),  # it leans elsewhere
+        ("spindle touches the part", (14, 15), 0.0, "auto", False),  # towards another direction
+        ("spindle touches the part", (5, 6), 0.0, "fixed", False),  # on a link, which pieces may not have
+        ("spindle touches the part", (9, 10), 0.0, "fixed", False),  # a cut begins there
+        ("spindle touches the table", (14, 15), 0.0, "fixed", False),
+        ("leg 1 touches the part", (14, 15), 0.0, "fixed", False),
+    ],
+)
+def test_the_tool_touches_the_part_wherever_that_stands(limit, waypoints, tilt, mode, so):
+    x = np.linspace(0.0, 0.1, 11)
+    line = np.column_stack([x, np.zeros((11, 2))])
+    up = np.tile([0.0, 0.0, 1.0], (11, 1))
+    kinds = (SegmentKind.LINK, SegmentKind.CUT)
+    path = Toolpath(tuple(Segment(kind, line + 0.1 * k * np.eye(3)[0], up, 0.02) for k, kind in enumerate(kinds)), 0.0)
+    planned = SimpleNamespace(
+        specification=SimpleNamespace(tilt=tilt), job=SimpleNamespace(axis=SimpleNamespace(mode=mode)), toolpath=path
+    )
+    refusal = Refusal("placement", "it does not fit", (Shortfall(limit, (waypoints,), 1.0, "mm"),), "")
+    assert stages.meets_wherever_it_stands(planned, refusal) == so

@@ -1,5 +1,6 @@
 """plan: what it returns holds at every waypoint, is not beaten nearby, is repeatable, and refuses with reasons."""
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +11,16 @@ from pentapod.base.refusal import Refusal
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import Component
+from pentapod.machine.clearance.collision_world import NOTHING
 from pentapod.planning import PlacedPath, PlacementConstraints, plan
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.placement.placed_path import UnplacedPath
 from pentapod.planning.placement.sampling import best_tilted_margins
-from pentapod.planning.plan import NEEDED_MARGIN
+from pentapod.planning.plan import FEW, NEEDED_MARGIN, fits
+from pentapod.planning.problem.constraints import FREE
 from pentapod.planning.problem.formulation import cayley
 from pentapod.planning.problem.samples import ToolpathSamples
+from pentapod.planning.problem.weights import EVEN
 from pentapod.toolpath.toolpath import Segment, SegmentKind, Toolpath
 
 TILT = np.radians(15.0)
@@ -222,3 +226,20 @@ def test_a_small_lean_is_a_tilt_cone(desk):
     cone = plan(cap, desk, tilt=0.1, component=PLUS, constraints=middle)
     np.testing.assert_array_equal(auto.unwrap().axes, cone.unwrap().axes)
     assert auto.unwrap().common_axis is None
+
+
+@pytest.mark.parametrize(("steep", "looks"), [(35.0, 2), (85.0, 1)])
+def test_what_does_not_fit_at_a_few_waypoints_is_not_looked_at_on_all(steep, looks, desk, monkeypatch):
+    """A part that is too steep is not searched for a place at all its waypoints."""
+    planner = importlib.import_module("pentapod.planning.plan")
+    path, searched, seen = dome(0.03, steep, 3000), planner._searched, []
+    monkeypatch.setattr(
+        planner, "_searched", lambda problem, *given: seen.append(len(problem.basis)) or searched(problem, *given)
+    )
+    options = planner.PlacementOptions(
+        tilt=0.0, common_axis=False, component=PLUS, constraints=FREE, weights=EVEN, collision_world=NOTHING,
+        limits=(), solver="sequential",
+    )  # fmt: skip
+    assert fits(path, desk, **options) == (looks == 2)
+    assert seen[0] == FEW < 0.5 * len(path)
+    assert len(seen) == looks

@@ -78,6 +78,10 @@ def verdict_text(verdict: Verdict) -> str:
     return "\n".join([*lines, f"verdict: {verdict.answer}"])
 
 
+_DIGITS = 12
+"""Behind the point: a rounding of 1e-159 degrees is nothing that anyone wants to read."""
+
+
 def _unjudged(entry: NotJudged) -> str:
     return f"  {'waived' if entry.waived else '??  '}  {entry.claim}: not judged: {entry.why}"
 
@@ -86,7 +90,7 @@ def _claim(certificate: Certificate) -> str:
     mark = "ok  " if certificate.passed else "FAIL"
     text = f"  {mark}  {certificate.claim}"
     if certificate.value is not None:
-        text += f": {certificate.value:.6g} {certificate.unit}".rstrip()
+        text += f": {round(certificate.value, _DIGITS):.6g} {certificate.unit}".rstrip()
     if certificate.bound is not None:
         allowed = f", {certificate.allowed:.6g} allowed" if certificate.is_lenient else ""
         text += f" ({certificate.sense} {certificate.bound:.6g}{allowed})"

@@ -35,6 +35,9 @@ from pentapod.planning.problem.weights import EVEN, NEEDED_MARGIN, Weights
 from pentapod.planning.tool_axis.spline import AxisSpline
 from pentapod.toolpath.toolpath import Toolpath
 
+FEW = 500
+"""Waypoints at which is looked first whether a part of a path fits."""
+
 KEPT_SHARE = 0.9
 """Share of the best smallest margin that is kept while the axis is smoothed."""
 
@@ -159,10 +162,15 @@ def fits(toolpath: Toolpath, machine: Machine, **options: Unpack[PlacementOption
         samples, machine, options["constraints"], options["weights"],
         component=options["component"], collision_world=options["collision_world"], limits=options["limits"],
     ).at(samples.shaping(toolpath.starts))  # fmt: skip
-    _, found = _searched(problem, tilt, common_axis, 0, options["solver"], silent)
-    if found.interrupted:
-        raise KeyboardInterrupt
-    return found.best.smallest >= NEEDED_MARGIN
+    # What does not fit at a few waypoints does not fit at all of them, and to look at many is most of a search.
+    few = problem.at(np.sort(problem.samples.representatives(FEW)))
+    for some, needed in ((few, 0.0), (problem, NEEDED_MARGIN)):
+        _, found = _searched(some, tilt, common_axis, 0, options["solver"], silent)
+        if found.interrupted:
+            raise KeyboardInterrupt
+        if found.best.smallest < needed:
+            return False
+    return True
 
 
 def _samples(toolpath: Toolpath, tilt: float, common_axis: bool | CommonAxesOptions) -> ToolpathSamples:

@@ -311,6 +311,30 @@ def test_what_is_higher_than_where_the_spindle_touches_the_part_is_planned(limit
         assert (at <= (limit == "tool body")) == bool(otherwise)  # an upright tool is tried before
 
 
+@pytest.mark.usefixtures("all_fits")
+def test_where_the_tool_touches_the_part_in_a_trial_what_is_higher_comes_next(tmp_path):
+    """With the axes of that trial, which are not tried in another place."""
+
+    def plan(job: Job, _) -> Tried:
+        planned.append(job)
+        return Tried("placement", meets=(0.5 * float(heights.min() + heights.max()),))
+
+    planned: list[Job] = []
+    job = Job.load(REFUSED["dome of 75 deg"].write(tmp_path))
+    machine, mesh = job_machine(job), job_mesh(job)
+    toolpath = job_toolpath(job, mesh, machine=machine)[0]
+    heights = toolpath.tips[:, 2]
+    short = [Shortfall("leg 1 too long", ((0, 1),), 1.0, "mm")]
+    advised(job, machine, mesh, toolpath, plan, AdviceOptions(plans=8), silent, short=short)
+    whole = [each for each in planned if each.part == job.part and each.placement.setups == 1]
+    assert len(whole) >= 2
+    assert len({(each.axis.mode, str(each.axis.direction)) for each in whole}) == len(whole)
+    for each in whole:
+        after = planned[planned.index(each) + 1]
+        assert after.part.region_box_mm[0][2] == pytest.approx(500.0 * (heights.min() + heights.max()), abs=0.06)
+        assert (after.axis, after.placement) == (each.axis, each.placement)
+
+
 @pytest.mark.parametrize("direction", ["+x", "-x", "+z", "-z"])
 def test_higher_is_along_the_direction_of_the_region(direction, tmp_path):
     """Of a block of 50 x 40 x 15 mm from a side, what is seen 5 mm below its top."""

@@ -21,8 +21,7 @@ from pentapod.geometry.directions import normalised
 from pentapod.job.advice.axes import OF_MODES, Changes, taken_out
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.parts import Regions
-from pentapod.job.advice.settings import Tell, merged
-from pentapod.job.advice.trials import Trial
+from pentapod.job.advice.settings import Tell, Trial, merged
 from pentapod.job.build.left import foreseen, uncovered
 from pentapod.job.build.other_ways import NEARER, may_come_nearer
 from pentapod.job.build.specification import job_collision_world, job_coverage, job_cutting

@@ -14,12 +14,14 @@ FEWEST = 4
 class Tried(NamedTuple):
     """How a plan ended. stage: that refused it, None where its verdict passed. margin: its smallest, if it is known.
 
-    failed: names of the claims that fail, of the other way in which it was planned where there is one.
+    failed: names of the claims that fail, of the other way in which it was planned where there is one. meets: heights
+    as of `met_below`, where nothing but the tool or the spindle that touches the part stood against its placement.
     """
 
     stage: str | None
     margin: float | None = None
     failed: frozenset[str] = frozenset()
+    meets: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.base.values import Value
 from pentapod.job.advice.failed_claims import FailedClaims
 from pentapod.job.advice.options import FEWEST, AdviceOptions, Tried
-from pentapod.job.advice.settings import LEFT_ALONE, TOUCHES, Settings, Tell, joined, merged, met_below
+from pentapod.job.advice.settings import LEFT_ALONE, TOUCHES, Settings, Tell, Trial, joined, merged, met_below
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.advice.starts import starts
-from pentapod.job.advice.trials import Trial, Trials
+from pentapod.job.advice.trials import Trials
 from pentapod.job.build.other_ways import may_stand
 from pentapod.job.build.tool import job_tool
 from pentapod.job.schema.job import Job

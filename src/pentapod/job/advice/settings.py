@@ -59,6 +59,17 @@ def met_below(
 
 
 @dataclass(frozen=True, eq=False)
+class Trial:
+    """Changes to plan. kept, whole: as in `Advice`; worth: those of more worth are planned first."""
+
+    words: str
+    changes: Changes
+    kept: float
+    worth: float
+    whole: bool = True
+
+
+@dataclass(frozen=True, eq=False)
 class Setting:
     """Tool axes and a placement, and what was estimated for a task with them."""
 

@@ -11,11 +11,10 @@ import numpy as np
 
 from pentapod.base.errors import InputError
 from pentapod.base.units import from_si, to_si
-from pentapod.job.advice.axes import Changes
 from pentapod.job.advice.options import FEWEST, AdviceOptions, Tried
 from pentapod.job.advice.parts import Regions, Smaller
 from pentapod.job.advice.places import Place
-from pentapod.job.advice.settings import LEFT_ALONE, Setting, Settings, joined, merged
+from pentapod.job.advice.settings import LEFT_ALONE, Setting, Settings, Trial, joined, merged
 from pentapod.job.build.values import job_machine
 from pentapod.planning.estimate import Estimate
 from pentapod.verify.claims.component import COMPONENT_KEPT
@@ -25,17 +24,6 @@ Because = Callable[[str], None]
 
 Ended = Callable[[], Tried | None]
 """Returns how the last trial ended; None where there was none."""
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """Changes to plan. kept, whole: as in `Advice`; worth: those of more worth are planned first."""
-
-    words: str
-    changes: Changes
-    kept: float
-    worth: float
-    whole: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +51,7 @@ class Trials:
         """Yield the trials, the best first as far as that is known. own: whether the job as it is counts as one."""
         too_wide = self.settings.share_in_reach(self.settings.sketch) < 1.0
         if self.otherwise:  # it was planned with two kinds of tool axes already
-            yield from self._higher()
+            yield from self._higher(self.meets)
         if not too_wide:
             yield from self._keeping_all(own)
         if not (self.placed and self.otherwise == LEFT_ALONE):  # smaller regions are tried by what is left on them
@@ -84,7 +72,7 @@ class Trials:
         if not self.meets:
             yield from self._more_setups(bases)
         elif not self.otherwise:
-            yield from self._higher()
+            yield from self._higher(self.meets)
         for base in bases:
             yield from self._smaller(base)
         if touching is not None:
@@ -104,6 +92,8 @@ class Trials:
             for setting in islice(self._in_place(place, own), self.options.failures):
                 yield from self._of_setting(setting)
                 last = self.ended()
+                if last is not None and last.meets:
+                    yield from self._higher(last.meets, setting)
                 if last is not None and last.failed and all(each.startswith(COMPONENT_KEPT) for each in last.failed):
                     break  # it is near a singular surface there, whatever the tool axes
 
@@ -133,7 +123,7 @@ class Trials:
             return
         if last.stage != "placement":
             self._programmed.append(setting)
-        if last.failed == LEFT_ALONE:
+        if last.failed == LEFT_ALONE or last.meets:
             self._failing.add(setting.axis.words)
 
     @cached_property
@@ -143,7 +133,7 @@ class Trials:
 
     @cached_property
     def _failing(self) -> set[str]:
-        """Words of tool axes with which too much is left on the surface, wherever the part is placed."""
+        """Words of tool axes with which too much is left, or the tool touches the part, wherever that is placed."""
         return {""} if self.otherwise == LEFT_ALONE else set()
 
     def _scarcely(self, own: bool) -> Iterator[Trial]:
@@ -209,12 +199,13 @@ class Trials:
             found += self._boxes(base, lambda share, deep=deep: regions.boxed(share, deep=deep))
         return [self._of_region(base, smaller) for smaller in found]
 
-    def _higher(self) -> Iterator[Trial]:
+    def _higher(self, heights: tuple[float, ...], base: Setting | None = None) -> Iterator[Trial]:
         """Yield what is higher than the places where the tool or the spindle touch the part."""
-        for height in self.meets:
+        for height in heights:
             self.settings.tell("only what is higher")
             if self._all_regions is not None and (smaller := self._all_regions.above(height)) is not None:
-                yield Trial(smaller.words, smaller.changes, smaller.share, smaller.share)
+                own = Trial(smaller.words, smaller.changes, smaller.share, smaller.share)
+                yield own if base is None else self._of_region(base, smaller)
 
     def _top(self, base: Setting) -> Iterator[Trial]:
         """Yield the flat top of the part: shank or holder may have room there, where they touch the part elsewhere."""

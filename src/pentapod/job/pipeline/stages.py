@@ -8,12 +8,14 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress
 from pentapod.base.refusal import Refusal
-from pentapod.job.advice.options import AdviceOptions, Tried
+from pentapod.job.advice.options import OPTIONS, AdviceOptions, Tried
 from pentapod.job.advice.search import advised
-from pentapod.job.advice.settings import LEFT_ALONE
+from pentapod.job.advice.settings import ABOVE_THE_TIP, LEFT_ALONE, met_below
 from pentapod.job.build.left import FORBIDDEN
 from pentapod.job.build.limits import timing_limits
 from pentapod.job.build.other_ways import made_upright, may_stand
@@ -32,11 +34,12 @@ from pentapod.job.stage_runner import StageRunner, ending_when_interrupted
 from pentapod.job.task import Task
 from pentapod.job.ways.names import FILES
 from pentapod.job.withheld import STAGE, failures
+from pentapod.machine.clearance.collision_world import PART
 from pentapod.machine.machine import Machine
 from pentapod.planning.setups import setups
 from pentapod.timing import Limit
-from pentapod.toolpath import Mesh
-from pentapod.toolpath.linking.partition import Piece, missed_cuts
+from pentapod.toolpath import Mesh, Toolpath
+from pentapod.toolpath.linking.partition import Piece, cutting_intervals, missed_cuts
 from pentapod.verify import Claim, Specification
 from pentapod.verify.surface.surface_left import SURFACE_LEFT
 
@@ -87,8 +90,37 @@ def planned(
     outcome = attempt.foreseen(upright=False) or attempt.planned()
     refusal = outcome.refusal
     if refusal is not None and refusal.stage == "placement" and piece is None and job.placement.setups > 1:
-        outcome = _split(attempt, refusal)
+        outcome = (
+            _split(attempt, refusal) if not meets_wherever_it_stands(task, refusal) else _unsplit(attempt, refusal)
+        )
     return attempt, outcome
+
+
+def meets_wherever_it_stands(task: Task, refusal: Refusal) -> bool:
+    """Return whether the tool or the spindle touches the part on a cut with axes that do not lean.
+
+    Then set-ups do not help: that depends on the tool's pose on the part, and not on where the part stands.
+    """
+    if task.specification.tilt > 0.0 or task.job.axis.mode == "auto":
+        return False
+    cuts = cutting_intervals(task.toolpath)
+    within = np.flatnonzero(cuts[1:] & cuts[:-1]) + 1
+    met = (each for each in refusal.diagnosis if each.constraint.startswith(ABOVE_THE_TIP))
+    return any(
+        np.searchsorted(within, last, "right") > np.searchsorted(within, first)
+        for each in met
+        if each.constraint.endswith(f"touches the {PART}")
+        for first, last in each.waypoints
+    )
+
+
+def _unsplit(attempt: Attempt, refusal: Refusal) -> Outcome:
+    """Return the refusal of a job for which more set-ups do not help."""
+    why = "above its tip the tool touches the part, wherever that stands"
+    told = dataclasses.replace(refusal, cause=f"set-ups do not help, {why}: {refusal.cause}")
+    runner = attempt.runner
+    runner.stages = [s if s.value is not refusal else s.with_value(told) for s in runner.stages]
+    return attempt.refused(told)
 
 
 def with_advice(attempt: Attempt, outcome: Outcome, again: Callable[..., Tried], options: AdviceOptions) -> Outcome:
@@ -143,9 +175,11 @@ def tried_of(outcome: Outcome) -> Tried:
     """Return how a plan ended, for the search for advice."""
     if outcome.passed:
         return Tried(None, outcome.margin)
-    stage = "verdict" if outcome.refusal is None else outcome.refusal.stage
-    way = outcome.find(FailedWay)
-    return Tried(stage, failed=frozenset(failures(outcome.verdict)) if way is None else way.claims)
+    refusal, way, meets = outcome.refusal, outcome.find(FailedWay), tuple[float, ...]()
+    if refusal is not None and refusal.stage == "placement":
+        meets = met_below(outcome.job, outcome.find(Toolpath), refusal.diagnosis, OPTIONS)
+    stage = "verdict" if refusal is None else refusal.stage
+    return Tried(stage, failed=frozenset(failures(outcome.verdict)) if way is None else way.claims, meets=meets)
 
 
 def _split(attempt: Attempt, refusal: Refusal) -> Outcome:

@@ -21,6 +21,10 @@ TOOL_BODY = "tool body"
 """Name of shank and holder in claims and margins."""
 
 
+PART = "part"
+"""Name of the obstacle that is the workpiece."""
+
+
 @dataclass(frozen=True, eq=False)
 class Obstacle(Value):
     """An obstacle. name: "part", "fixture", "table". surface: its mesh.
@@ -72,7 +76,7 @@ class CollisionWorld(Value):
                 expected=f"at most {1e3 * room:.4g} mm from the tip to the holder's end",
                 remedy="a longer tool length, or a shorter holder",
             )
-        found = [Obstacle("part", MeshDistance.of(part), clamped=True, allowance=allowance)]
+        found = [Obstacle(PART, MeshDistance.of(part), clamped=True, allowance=allowance)]
         for name, mesh in (("fixture", fixture), ("table", table)):
             if mesh is not None:
                 found.append(Obstacle(name, MeshDistance.of(mesh), clamped=name == "fixture"))
