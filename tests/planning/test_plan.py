@@ -228,11 +228,11 @@ def test_a_small_lean_is_a_tilt_cone(desk):
     assert auto.unwrap().common_axis is None
 
 
-@pytest.mark.parametrize(("steep", "looks"), [(35.0, 2), (85.0, 1)])
-def test_what_does_not_fit_at_a_few_waypoints_is_not_looked_at_on_all(steep, looks, desk, monkeypatch):
-    """A part that is too steep is not searched for a place at all its waypoints."""
+@pytest.mark.parametrize(("steep", "waypoints", "looks"), [(35.0, 3000, 2), (85.0, 3000, 1), (35.0, 700, 1)])
+def test_what_does_not_fit_at_a_few_waypoints_is_not_looked_at_on_all(steep, waypoints, looks, desk, monkeypatch):
+    """A part that is too steep is not searched for a place at all its waypoints; a short path has few."""
     planner = importlib.import_module("pentapod.planning.plan")
-    path, searched, seen = dome(0.03, steep, 3000), planner._searched, []
+    path, searched, seen = dome(0.03, steep, waypoints), planner._searched, []
     monkeypatch.setattr(
         planner, "_searched", lambda problem, *given: seen.append(len(problem.basis)) or searched(problem, *given)
     )
@@ -240,6 +240,6 @@ def test_what_does_not_fit_at_a_few_waypoints_is_not_looked_at_on_all(steep, loo
         tilt=0.0, common_axis=False, component=PLUS, constraints=FREE, weights=EVEN, collision_world=NOTHING,
         limits=(), solver="sequential",
     )  # fmt: skip
-    assert fits(path, desk, **options) == (looks == 2)
-    assert seen[0] == FEW < 0.5 * len(path)
+    assert fits(path, desk, **options) == (steep < 40.0)
+    assert (seen[0] == FEW) == (waypoints > 2 * FEW)
     assert len(seen) == looks

@@ -79,7 +79,7 @@ def verdict_text(verdict: Verdict) -> str:
 
 
 _DIGITS = 12
-"""Behind the point: a rounding of 1e-159 degrees is nothing that anyone wants to read."""
+"""Digits after the decimal point: nobody wants to read a rounding error of 1e-159 degrees."""
 
 
 def _unjudged(entry: NotJudged) -> str:
@@ -90,7 +90,7 @@ def _claim(certificate: Certificate) -> str:
     mark = "ok  " if certificate.passed else "FAIL"
     text = f"  {mark}  {certificate.claim}"
     if certificate.value is not None:
-        text += f": {round(certificate.value, _DIGITS):.6g} {certificate.unit}".rstrip()
+        text += f": {round(certificate.value, _DIGITS) + 0.0:.6g} {certificate.unit}".rstrip()
     if certificate.bound is not None:
         allowed = f", {certificate.allowed:.6g} allowed" if certificate.is_lenient else ""
         text += f" ({certificate.sense} {certificate.bound:.6g}{allowed})"

@@ -163,8 +163,10 @@ def fits(toolpath: Toolpath, machine: Machine, **options: Unpack[PlacementOption
         component=options["component"], collision_world=options["collision_world"], limits=options["limits"],
     ).at(samples.shaping(toolpath.starts))  # fmt: skip
     # What does not fit at a few waypoints does not fit at all of them, and to look at many is most of a search.
-    few = problem.at(np.sort(problem.samples.representatives(FEW)))
-    for some, needed in ((few, 0.0), (problem, NEEDED_MARGIN)):
+    looks = [(problem, NEEDED_MARGIN)]
+    if len(problem.basis) > 2 * FEW:
+        looks.insert(0, (problem.at(np.sort(problem.samples.representatives(FEW))), 0.0))
+    for some, needed in looks:
         _, found = _searched(some, tilt, common_axis, 0, options["solver"], silent)
         if found.interrupted:
             raise KeyboardInterrupt

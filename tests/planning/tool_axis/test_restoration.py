@@ -1,7 +1,5 @@
 """Restoration of the margin: what changes, what stays, and what cannot be restored."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -39,11 +37,15 @@ class Ridges:
 
 @pytest.fixture
 def programs(desk):
-    """Splines along a straight path past the ridges, with as many waypoints as COUNT."""
+    return programs_of(desk, Ridges, COUNT)
+
+
+def programs_of(desk, limit, count: int) -> AxisPrograms:
+    """Splines along a straight path of 200 mm with `count` waypoints."""
     here = RigidTransform(np.diag([1.0, -1.0, -1.0]), desk.work.centre)
-    centres = np.c_[np.linspace(-0.1, 0.1, COUNT), np.zeros((COUNT, 2))]
-    samples = ToolpathSamples(centres, np.tile([0.0, 0.0, 1.0], (COUNT, 1)), 0.0, np.radians(20.0))
-    limits = (LimitKind(lambda _: [Ridges(float(here.translation[0]))]),)
+    centres = np.c_[np.linspace(-0.1, 0.1, count), np.zeros((count, 2))]
+    samples = ToolpathSamples(centres, np.tile([0.0, 0.0, 1.0], (count, 1)), 0.0, np.radians(20.0))
+    limits = (LimitKind(lambda _: [limit(float(here.translation[0]))]),)
     problem = PlacementProblem.of(samples, desk, PlacementConstraints.fixture([here]), limits=limits)
     start = problem.candidate(problem.margins[0], here, problem.upright)
     return AxisPrograms(problem, start, SMOOTHING)
@@ -68,16 +70,45 @@ def test_only_coefficients_near_short_waypoints_change(programs):
     assert 0 < len(moved) < 0.6 * len(c)
 
 
-def test_what_cannot_be_restored_does_not_keep_the_rest_from_it(programs):
-    """At the second of the two places the margin stays where it is, whatever the lean."""
+@pytest.mark.parametrize("away", [12, 24, 60, 200])
+def test_what_cannot_be_restored_does_not_keep_the_rest_from_it(away, programs):
+    """At a waypoint so many from the second of the two places the margin stays where it is, whatever the lean."""
     values = programs.values
     _, rows, before = everything(programs)
-    second = (rows > COUNT // 2) & (before.min(axis=1) < KEEP)
-    programs.values = lambda c, rows, keep: np.where(second[rows, None], -1.0, values(c, rows, keep))
+    hopeless = int(np.flatnonzero(before.min(axis=1) < KEEP).max()) - away
+    programs.values = lambda c, rows, keep: np.where(rows[:, None] == hopeless, -1.0, values(c, rows, keep))
     _, margins = restored(programs, *everything(programs), KEEP)
-    assert before[: COUNT // 2].min() < KEEP - SMOOTHING.slack
-    assert margins[: COUNT // 2].min() >= KEEP - SMOOTHING.slack
-    assert (margins.min(axis=1)[second] == -1.0).all()
+    others = rows != hopeless
+    assert before[others].min() < KEEP - SMOOTHING.slack
+    assert margins[others].min() >= KEEP - SMOOTHING.slack
+    assert margins[hopeless].min() == -1.0
+
+
+class Traded:
+    """A limit that many waypoints of a place want to lean one way for, and one, which is less short, the other way."""
+
+    name, unit, group = "traded", "1", "bodies"
+
+    def __init__(self, middle: float) -> None:
+        self.middle = middle
+
+    def margin(self, pose):
+        along, y = pose.tip[0] - self.middle, pose.axis[1]
+        near, one = 1.0 / (1.0 + (along / 2e-3) ** 8), 1.0 / (1.0 + (along / 2e-4) ** 8)
+        return 0.3 * (1.0 - near) + near * ((1.0 - one) * (0.085 + 0.3 * y) + one * (0.092 - 0.3 * y))
+
+    def shortfall(self, margin):
+        return -margin
+
+
+def test_the_smallest_margin_does_not_fall(desk):
+    """Many waypoints would gain what the worst one loses."""
+    programs = programs_of(desk, Traded, 1001)
+    c, rows = np.zeros((programs.spline.basis.shape[1], 2)), np.arange(1001)
+    before = programs.values(c, rows, KEEP)
+    assert 10 < np.count_nonzero(before.min(axis=1) < KEEP) < 40
+    _, after = restored(programs, c, rows, before, KEEP)
+    assert after.min() >= before.min() - SMOOTHING.slack
 
 
 def test_more_coefficients_move_where_steps_of_a_few_fail(programs, monkeypatch):
@@ -86,10 +117,10 @@ def test_more_coefficients_move_where_steps_of_a_few_fail(programs, monkeypatch)
     around = Stretches.around
     monkeypatch.setattr(Stretches, "around", lambda *given: tried.append(around(*given)) or tried[-1])
     programs.values = lambda c, rows, keep: np.where(rows[:, None] == 100, -1.0, values(c, rows, keep))
-    restored(programs, *everything(programs), KEEP, replace(OPTIONS, most=16, programs=100))
+    restored(programs, *everything(programs), KEEP)
     widths = [int(np.ptp(each.runs[0])) for each in tried]
-    assert widths[0] <= 2 * 8 + 6 < 2 * 16 + 4 <= widths[-1] <= 2 * 16 + 6
-    assert len(widths) < 100
+    assert widths[0] <= 2 * OPTIONS.beside + 6 < 2 * OPTIONS.most < max(widths)
+    assert len(widths) < OPTIONS.programs
 
 
 def test_leans_that_keep_the_margin_stay_as_they_are(programs):

@@ -21,6 +21,7 @@ from pentapod.job.build.reach import farthest_apart
 from pentapod.job.build.specification import job_collision_world
 from pentapod.job.build.tool import job_tool
 from pentapod.job.schema.job import Job
+from pentapod.machine.clearance.collision_world import PART
 from pentapod.machine.machine import Machine
 from pentapod.mesh.mesh import Mesh
 from pentapod.planning.estimate import Estimate, Estimator
@@ -44,14 +45,19 @@ LEFT_ALONE = frozenset((SURFACE_LEFT,))
 """What fails where the tool leaves too much, wherever the part is placed."""
 
 
+def touches_the_part(each: Shortfall) -> bool:
+    """Return whether a shortfall is that the tool, above its tip, or the spindle touches the part."""
+    return each.constraint.startswith(ABOVE_THE_TIP) and f"touches the {PART}" in each.constraint
+
+
 def met_below(
     job: Job, toolpath: Toolpath | None, short: Sequence[Shortfall], options: AdviceOptions
 ) -> tuple[float, ...]:
-    """Return heights along the region's direction, metres, below which the tool or the spindle touch the part.
+    """Return heights along the region's direction, metres, below which the tool or the spindle touches the part.
 
     Below the first are nearly all such places, below the last are all. Empty where a placement has other shortfalls.
     """
-    if toolpath is None or not short or not all(each.constraint.startswith(ABOVE_THE_TIP) for each in short):
+    if toolpath is None or not short or not all(touches_the_part(each) for each in short):
         return ()
     rows = np.concatenate([np.arange(a, b + 1) for each in short for a, b in each.waypoints])
     heights = toolpath.tips[rows] @ normalised(job.part.si.region_direction)

@@ -93,7 +93,7 @@ class Trials:
                 yield from self._of_setting(setting)
                 last = self.ended()
                 if last is not None and last.meets:
-                    yield from self._higher(last.meets, setting)
+                    yield from self._higher(last.meets[-1:], setting)
                 if last is not None and last.failed and all(each.startswith(COMPONENT_KEPT) for each in last.failed):
                     break  # it is near a singular surface there, whatever the tool axes
 
@@ -123,7 +123,8 @@ class Trials:
             return
         if last.stage != "placement":
             self._programmed.append(setting)
-        if last.failed == LEFT_ALONE or last.meets:
+        # Axes that may lean do so in another way in another place.
+        if last.failed == LEFT_ALONE or (last.meets and setting.found.samples.tilt == 0.0):
             self._failing.add(setting.axis.words)
 
     @cached_property

@@ -15,7 +15,7 @@ from pentapod.base.progress import Progress
 from pentapod.base.refusal import Refusal
 from pentapod.job.advice.options import OPTIONS, AdviceOptions, Tried
 from pentapod.job.advice.search import advised
-from pentapod.job.advice.settings import ABOVE_THE_TIP, LEFT_ALONE, met_below
+from pentapod.job.advice.settings import LEFT_ALONE, met_below, touches_the_part
 from pentapod.job.build.left import FORBIDDEN
 from pentapod.job.build.limits import timing_limits
 from pentapod.job.build.other_ways import made_upright, may_stand
@@ -34,7 +34,6 @@ from pentapod.job.stage_runner import StageRunner, ending_when_interrupted
 from pentapod.job.task import Task
 from pentapod.job.ways.names import FILES
 from pentapod.job.withheld import STAGE, failures
-from pentapod.machine.clearance.collision_world import PART
 from pentapod.machine.machine import Machine
 from pentapod.planning.setups import setups
 from pentapod.timing import Limit
@@ -105,19 +104,14 @@ def meets_wherever_it_stands(task: Task, refusal: Refusal) -> bool:
         return False
     cuts = cutting_intervals(task.toolpath)
     within = np.flatnonzero(cuts[1:] & cuts[:-1]) + 1
-    met = (each for each in refusal.diagnosis if each.constraint.startswith(ABOVE_THE_TIP))
-    return any(
-        np.searchsorted(within, last, "right") > np.searchsorted(within, first)
-        for each in met
-        if each.constraint.endswith(f"touches the {PART}")
-        for first, last in each.waypoints
-    )
+    met = (waypoints for each in refusal.diagnosis if touches_the_part(each) for waypoints in each.waypoints)
+    return any(np.searchsorted(within, last, "right") > np.searchsorted(within, first) for first, last in met)
 
 
 def _unsplit(attempt: Attempt, refusal: Refusal) -> Outcome:
     """Return the refusal of a job for which more set-ups do not help."""
     why = "above its tip the tool touches the part, wherever that stands"
-    told = dataclasses.replace(refusal, cause=f"set-ups do not help, {why}: {refusal.cause}")
+    told = dataclasses.replace(refusal, cause=f"set-ups do not help: {why}; in one set-up {refusal.cause}")
     runner = attempt.runner
     runner.stages = [s if s.value is not refusal else s.with_value(told) for s in runner.stages]
     return attempt.refused(told)

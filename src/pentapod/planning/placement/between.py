@@ -64,7 +64,7 @@ def clear_between(
             short[max(first - options.beside, 0) : last + options.beside + 1] = True
         spare = np.where(short, np.maximum(options.first, options.more * spare), spare)
         again = restored_along_spline(replace(problem, spare=spare), at, keep, found, progress)
-        if problem.values_of(at.margins, at.transform, again).min() < ENOUGH - SMOOTHING.slack:
+        if again is None or problem.values_of(at.margins, at.transform, again).min() < ENOUGH - SMOOTHING.slack:
             break
         found = again
     return best

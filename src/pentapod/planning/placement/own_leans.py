@@ -244,8 +244,11 @@ def along_spline(
 
 def restored_along_spline(
     problem: PlacementProblem, at: Candidate, keep: float, leans: Floats, progress: Progress
-) -> Floats:
-    """Return leans (N, 3) of a spline through given ones, changed where these do not keep a margin, or nearer to it."""
+) -> Floats | None:
+    """Return leans (N, 3) of a spline through given ones that keep a margin, or come nearer to it.
+
+    They change where the spline does not keep it. None where they exceed the limit of the axes.
+    """
     programs = AxisPrograms(problem, at, QUICKLY)
-    c, _ = restored_everywhere(programs, programs.spline.fitted(leans), keep, progress)
-    return programs.spline.leans(c)
+    c, margins = restored_everywhere(programs, programs.spline.fitted(leans), keep, progress)
+    return None if programs.beyond_own_limit(margins, keep) else programs.spline.leans(c)

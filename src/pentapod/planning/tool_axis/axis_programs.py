@@ -73,6 +73,10 @@ class AxisPrograms:
         """Whether the last margin is the limit of the axes."""
         return self.problem.samples.own is not None
 
+    def beyond_own_limit(self, margins: Floats, keep: float) -> bool:
+        """Return whether margins (n, M), to a margin to keep, exceed the limit of the axes."""
+        return self.own_limit and float(margins[:, -1].min()) < keep - self.options.slack
+
     def trial(self, c: Floats, rows: Ints, keep: float) -> Trial:
         """Return what coefficients (K, 2) have at waypoints `rows`."""
         return Trial(c, self.values(c, rows, keep), self.objective.of(c), keep)

@@ -1,9 +1,9 @@
 """Smoothing of the tool axis: the smoothest axes that keep a margin, by sequential convex programming.
 
 Each program holds the margins near the one to keep, to first order, and the penalty on excess. Its solution is judged
-by the margins and the cost themselves, at the waypoints where the spline has its nodes. Where it fails at some places
-alone, it is taken elsewhere, or restored there, and the next one may move less there. In the end all waypoints are
-checked; where the margin cannot be restored, they are added, and the iteration is repeated.
+by the margins and the cost themselves, at all waypoints or at those where the spline has its nodes. Where it fails at
+some places alone, it is taken elsewhere, or restored there, and the next one may move less there. In the end all
+waypoints are checked; where the margin cannot be restored, they are added, and the iteration is repeated.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pentapod.planning.problem.linear_model import valleys
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.tool_axis.axis_programs import AxisPrograms, MarginModel, Trial, shaped_by
 from pentapod.planning.tool_axis.restoration import OPTIONS as RESTORATION
-from pentapod.planning.tool_axis.restoration import RestorationOptions, restored, restored_everywhere
+from pentapod.planning.tool_axis.restoration import restored, restored_everywhere
 from pentapod.planning.tool_axis.smoothing_options import OPTIONS, SmoothingOptions
 from pentapod.planning.tool_axis.spline import within_discs
 from pentapod.planning.tool_axis.trust_region import TrustRegion
@@ -39,15 +39,14 @@ def smoothed(
     """Return coefficients (K, 2) of the smoothest spline of the axes that keeps the margin `keep`.
 
     It starts at the leans of `start`, or at `leans` (N, 3), and keeps its placement. From given leans it may keep a
-    part of the margin alone (`enough`). None where none was found. progress: gets a report after each program; how many
-    there will be is not known.
+    part of the margin alone (`enough`), but the whole limit of the axes. None where none was found. progress: gets a
+    report after each program; how many there will be is not known.
     """
     programs = AxisPrograms(problem, start, options)
     given = programs.spline.fitted(problem.leans(start.coefficients) if leans is None else leans)
     begun, margins = restored_everywhere(programs, given, keep, progress)
-    reached = float(margins.min())
-    if reached < keep - options.slack:
-        if leans is None or reached < options.enough * keep:
+    if (reached := float(margins.min())) < keep - options.slack:
+        if leans is None or reached < options.enough * keep or programs.beyond_own_limit(margins, keep):
             return None
         keep = reached
     run = _Smoothing(programs, keep, progress, begun, margins, own=leans is not None)
@@ -56,7 +55,7 @@ def smoothed(
     for _ in range(options.rounds):
         found, margins = restored_everywhere(programs, run.smoothest(), keep, progress)
         if margins.min() >= keep - options.slack:
-            return found
+            return min((found, begun), key=programs.objective.of)
         run.add_violated(margins)
         run.return_to(begun)
     return begun
@@ -125,8 +124,8 @@ class _Smoothing:
                 taken, failing = self.taken(trial, predicted)
                 if taken is not None:
                     self.at, gain = taken, now.cost - taken.cost
-                    bound = float(np.mean(lengths > 0.99 * self.trust.radii))
-                    if max(gain, predicted) < options.decrease * now.cost and bound < options.bound:
+                    as_far = float(np.mean(lengths > 0.99 * self.trust.radii))
+                    if max(gain, predicted) < options.decrease * now.cost and as_far < options.bound:
                         break  # converged
                     self.accuracy = float(np.clip(options.finer * gain / now.cost, options.fine, options.rough))
                     self.trust.after(lengths, failing, good=good)
@@ -148,9 +147,9 @@ class _Smoothing:
                 break
         return self.at.c
 
-    def repaired(self, trial: Trial, options: RestorationOptions = RESTORATION) -> Trial:
-        """Return a trial that is changed where it is short, and keeps the margin there, or more of it."""
-        c, margins = restored(self.programs, trial.c, self.rows, trial.margins, self.keep, options, self.progress)
+    def repaired(self, trial: Trial) -> Trial:
+        """Return a trial that is changed where it is short, and keeps the margin there, or comes nearer to it."""
+        c, margins = restored(self.programs, trial.c, self.rows, trial.margins, self.keep, REPAIR, self.progress)
         return Trial(c, margins, self.programs.objective.of(c), self.keep)
 
     def taken(self, trial: Trial, predicted: float) -> tuple[Trial | None, Bools]:
@@ -166,7 +165,7 @@ class _Smoothing:
         part, failing = self.where_it_holds(trial, failing)
         found = [part]
         if self.at.cost - part.cost < self.options.most * predicted:
-            other = self.repaired(trial, REPAIR)
+            other = self.repaired(trial)
             found.append(self.where_it_holds(other, self.failing(other))[0])
         better = [each for each in found if self.accepts(each)]
         return min(better, key=lambda each: each.cost, default=None), failing

@@ -12,8 +12,9 @@ class SmoothingOptions:
     """Options of the sequential convex programming.
 
     steps, rounds: maximum of programs, and of checks at all waypoints. slack: accepted shortfall of the margin to keep,
-    micrometres of a stroke. decrease: relative decrease of the cost below which the iteration stops, unless more than a
-    share `bound` of the coefficients move as far as they may. cost: of the penalty on excess.
+    micrometres of a stroke. decrease: relative decrease of the cost below which the iteration stops; after a step that
+    was taken it goes on if more than a share `bound` of the coefficients moved as far as they may. cost: of the penalty
+    on excess.
 
     near: margins within this distance of the one to keep enter a program. spare: except those that, to first order,
     stay this much above it within the trust region. rough, fine, finer: accuracies of the first program and of the

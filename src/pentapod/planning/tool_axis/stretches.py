@@ -18,7 +18,7 @@ from pentapod.numerics.convex.banded_qp import NEIGHBOURS, banded_product
 class Stretches:
     """Runs (R, 2) of coefficients that may move: first of each and its end, NEIGHBOURS apart from each other at least.
 
-    Each has NEIGHBOURS coefficients at least, so no waypoint belongs to two of them.
+    No waypoint belongs to two of them. Each must have NEIGHBOURS coefficients at least.
     """
 
     runs: Ints
@@ -26,7 +26,10 @@ class Stretches:
 
     @classmethod
     def around(cls, places: Bools, beside: Ints) -> Stretches:
-        """Return those around coefficients `places` (K,), with as many on either side as `beside` (K,) says there."""
+        """Return those around coefficients `places` (K,), with as many on either side as `beside` (K,) says there.
+
+        There must be a place, and on either side of it at least three coefficients, or the end of the path.
+        """
         at, count = np.flatnonzero(places), len(places)
         edges = np.zeros(count + 1, dtype=np.intp)
         np.add.at(edges, np.maximum(at - beside[at], 0), 1)
