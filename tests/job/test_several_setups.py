@@ -235,9 +235,7 @@ def test_set_ups_are_not_searched_for_where_they_do_not_help(job, tmp_path, monk
     monkeypatch.setattr(stages, "meets_wherever_it_stands", lambda *_: True)
     monkeypatch.setattr(stages, "setups", lambda *_: pytest.fail("a partition is searched for"))
     refusal = run(Job.load(job), tmp_path / "out", advice=None).refusal
-    assert refusal.cause.startswith(
-        "set-ups do not help, above its tip the tool touches the part, wherever that stands: "
-    )
+    assert refusal.cause.startswith("set-ups do not help: above its tip the tool touches the part")
     assert json.loads((tmp_path / "out" / "verdict.json").read_text())["refusal"]["cause"] == refusal.cause
 
 

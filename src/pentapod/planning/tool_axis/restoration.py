@@ -1,7 +1,7 @@
 """Restoration of the margin: a spline of the tool axis changes only near the waypoints that are short of it.
 
 A few waypoints are short, as beside an edge, and the path is long. So the coefficients around these places are moved by
-convex programs of their own, and the rest of the path stays as it is, bit for bit. All stretches are solved as one
+convex programs of their own, and all others stay as they are, bit for bit. All stretches are solved as one
 banded program; each takes its part of the step, or does not.
 """
 
