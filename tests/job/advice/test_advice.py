@@ -313,7 +313,7 @@ def test_what_is_higher_than_where_the_spindle_touches_the_part_is_planned(limit
 
 @pytest.mark.usefixtures("all_fits")
 def test_where_the_tool_touches_the_part_in_a_trial_what_is_higher_comes_next(tmp_path):
-    """With the axes of that trial, which are not tried in another place."""
+    """With the axes of that trial."""
 
     def plan(job: Job, _) -> Tried:
         planned.append(job)
@@ -328,7 +328,6 @@ def test_where_the_tool_touches_the_part_in_a_trial_what_is_higher_comes_next(tm
     advised(job, machine, mesh, toolpath, plan, AdviceOptions(plans=8), silent, short=short)
     whole = [each for each in planned if each.part == job.part and each.placement.setups == 1]
     assert len(whole) >= 2
-    assert len({(each.axis.mode, str(each.axis.direction)) for each in whole}) == len(whole)
     for each in whole:
         after = planned[planned.index(each) + 1]
         assert after.part.region_box_mm[0][2] == pytest.approx(500.0 * (heights.min() + heights.max()), abs=0.06)

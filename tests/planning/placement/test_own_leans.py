@@ -258,6 +258,32 @@ def test_leans_beyond_the_limit_of_the_axes_come_inside(beyond):
     assert smallest(problem, start, found) >= 0.1 - SMOOTHING.slack
 
 
+class Off:
+    """A limit that keeps the axis on the side from which the limit of the axes wants it back."""
+
+    name, unit, group = "off", "1", "bodies"
+
+    def margin(self, pose):
+        return 0.1 + pose.axis[1]
+
+    def shortfall(self, margin):
+        return -margin
+
+
+@pytest.mark.parametrize("keep", [0.04, 0.08, 0.1])
+def test_the_limit_of_the_axes_is_kept_where_a_margin_pulls_the_other_way(keep, beyond, walls, desk):
+    """The margin may be kept in part alone; the limit of the axes may not."""
+    problem, start, leans = beyond
+    kinds = (*walls[1]["limits"], LimitKind(lambda _: [Off()]))
+    problem = PlacementProblem.of(problem.samples, desk, problem.constraints, limits=kinds)
+    start = problem.candidate(problem.margins[0], start.transform, problem.upright)
+    found = smoothed(problem, start, keep, leans=leans)
+    assert found is not None
+    axes = lean(problem.samples.nominal, AxisSpline.of(problem.samples, problem.cone).leans(found))
+    assert problem.samples.inside(axes).min() >= -2.0 * SMOOTHING.slack
+    assert smallest(problem, start, found) >= SMOOTHING.enough * keep
+
+
 def test_no_lean_of_a_grid_beyond_the_limit_of_the_axes_is_chosen(beyond):
     problem, start, leans = beyond
     samples, rows = problem.samples, np.arange(0, 360, 30)

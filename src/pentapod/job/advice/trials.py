@@ -123,8 +123,7 @@ class Trials:
             return
         if last.stage != "placement":
             self._programmed.append(setting)
-        # Axes that may lean do so in another way in another place.
-        if last.failed == LEFT_ALONE or (last.meets and setting.found.samples.tilt == 0.0):
+        if last.failed == LEFT_ALONE:
             self._failing.add(setting.axis.words)
 
     @cached_property
@@ -134,7 +133,7 @@ class Trials:
 
     @cached_property
     def _failing(self) -> set[str]:
-        """Words of tool axes with which too much is left, or the tool touches the part, wherever that is placed."""
+        """Words of tool axes with which too much is left, wherever the part is placed."""
         return {""} if self.otherwise == LEFT_ALONE else set()
 
     def _scarcely(self, own: bool) -> Iterator[Trial]:

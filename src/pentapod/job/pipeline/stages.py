@@ -89,9 +89,8 @@ def planned(
     outcome = attempt.foreseen(upright=False) or attempt.planned()
     refusal = outcome.refusal
     if refusal is not None and refusal.stage == "placement" and piece is None and job.placement.setups > 1:
-        outcome = (
-            _split(attempt, refusal) if not meets_wherever_it_stands(task, refusal) else _unsplit(attempt, refusal)
-        )
+        in_vain = meets_wherever_it_stands(task, refusal)
+        outcome = _refused_in_vain(attempt, refusal) if in_vain else _split(attempt, refusal)
     return attempt, outcome
 
 
@@ -108,7 +107,7 @@ def meets_wherever_it_stands(task: Task, refusal: Refusal) -> bool:
     return any(np.searchsorted(within, last, "right") > np.searchsorted(within, first) for first, last in met)
 
 
-def _unsplit(attempt: Attempt, refusal: Refusal) -> Outcome:
+def _refused_in_vain(attempt: Attempt, refusal: Refusal) -> Outcome:
     """Return the refusal of a job for which more set-ups do not help."""
     why = "above its tip the tool touches the part, wherever that stands"
     told = dataclasses.replace(refusal, cause=f"set-ups do not help: {why}; in one set-up {refusal.cause}")

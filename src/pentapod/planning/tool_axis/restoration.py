@@ -7,7 +7,7 @@ banded program; each takes its part of the step, or does not.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -51,6 +51,12 @@ class RestorationOptions:
 
 OPTIONS = RestorationOptions()
 
+_ANY = -1e3
+"""A margin that all axes keep."""
+
+_GENTLY = replace(OPTIONS, largest=0.02)
+"""How axes are brought within their limit: in short steps, so that they lose little of the margins."""
+
 
 def restored(
     programs: AxisPrograms,
@@ -78,9 +84,16 @@ def restored(
 def restored_everywhere(
     programs: AxisPrograms, c: Floats, keep: float, progress: Progress = silent
 ) -> tuple[Floats, Floats]:
-    """Return coefficients (K, 2) near c that keep a margin, or come nearer to it, and the margins (N, M) everywhere."""
+    """Return coefficients (K, 2) near c that keep a margin, or come nearer to it, and the margins (N, M) everywhere.
+
+    The limit of the axes comes first: they are brought within it, whatever the margins become, and stay there.
+    """
     rows = np.arange(len(programs.spline.frames))
-    return restored(programs, c, rows, programs.values(c, rows, keep), keep, progress=progress)
+    margins = programs.values(c, rows, keep)
+    if programs.beyond_own_limit(margins, keep):
+        c, _ = restored(programs, c, rows, programs.values(c, rows, _ANY), _ANY, _GENTLY, progress)
+        margins = programs.values(c, rows, keep)
+    return restored(programs, c, rows, margins, keep, progress=progress)
 
 
 class _Restoration:
