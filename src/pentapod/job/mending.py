@@ -35,6 +35,7 @@ from pentapod.job.outcome import Outcome
 from pentapod.job.schema.job import Job
 from pentapod.job.withheld import STAGE, failures
 from pentapod.machine.machine import Machine
+from pentapod.mesh.mesh import Mesh
 from pentapod.planning import PlacedPath
 from pentapod.program import Program
 from pentapod.timing import JerkOptions
@@ -129,7 +130,8 @@ class FailedWay(Value):
         """Return the way whose run ended with an outcome."""
         failed, short = failures(outcome.verdict), () if outcome.refusal is None else outcome.refusal.diagnosis
         left = _value(failed) if set(failed) == {SURFACE_LEFT} else None
-        return cls(frozenset(failed), left, met_below(outcome.job, outcome.find(Toolpath), short, ADVICE))
+        about = outcome.job, outcome.find(Mesh), outcome.find(Toolpath)
+        return cls(frozenset(failed), left, met_below(*about, short, ADVICE))
 
 
 @dataclass(frozen=True)

@@ -301,7 +301,7 @@ def test_what_is_higher_than_where_the_spindle_touches_the_part_is_planned(limit
     options = AdviceOptions(plans=8, replans=8)
     advised(job, machine, mesh, toolpath, plan, options, silent, short=short, otherwise=otherwise)
     cuts = [None if each.part.region_box_mm is None else each.part.region_box_mm[0][2] for each in planned]
-    first, last = (float(np.quantile(heights[bad], share)) for share in (options.nearly_all, 1.0))
+    first, last = (float(np.quantile(heights[bad], share)) + 0.5 for share in (options.nearly_all, 1.0))
     if limit == "leg 1":
         assert all(cut is None or abs(cut - last) > 0.1 for cut in cuts)
     else:
@@ -312,25 +312,28 @@ def test_what_is_higher_than_where_the_spindle_touches_the_part_is_planned(limit
 
 
 @pytest.mark.usefixtures("all_fits")
-def test_where_the_tool_touches_the_part_in_a_trial_what_is_higher_comes_next(tmp_path):
-    """With the axes of that trial."""
+@pytest.mark.parametrize("leans", [True, False])
+def test_where_the_tool_touches_the_part_in_a_trial_what_is_higher_comes_next(leans, tmp_path):
+    """With the axes and the placement of that trial. Axes that may not lean are not tried in another place."""
 
     def plan(job: Job, _) -> Tried:
         planned.append(job)
-        return Tried("placement", meets=(0.5 * float(heights.min() + heights.max()),))
+        return Tried("placement", meets=(0.0195,))
 
     planned: list[Job] = []
-    job = Job.load(REFUSED["dome of 75 deg"].write(tmp_path))
+    job = Job.load(REFUSED["dome of 75 deg"].write(tmp_path)).with_(placement={"mode": "table", "table_z_mm": 400.0})
+    job = job if leans else job.with_(tool={"type": "bull", "corner_mm": 1.0}, axis={"tilt_deg": None})
     machine, mesh = job_machine(job), job_mesh(job)
     toolpath = job_toolpath(job, mesh, machine=machine)[0]
-    heights = toolpath.tips[:, 2]
     short = [Shortfall("leg 1 too long", ((0, 1),), 1.0, "mm")]
     advised(job, machine, mesh, toolpath, plan, AdviceOptions(plans=8), silent, short=short)
-    whole = [each for each in planned if each.part == job.part and each.placement.setups == 1]
-    assert len(whole) >= 2
+    same = [each for each in planned if (each.tool, each.placement.setups) == (job.tool, 1)]
+    whole = [each for each in same if each.part == job.part]
+    fixed = [each.placement.mode for each in whole if each.axis.mode == "fixed"]
+    assert fixed == (["table", "free"] if leans else ["table"])
     for each in whole:
         after = planned[planned.index(each) + 1]
-        assert after.part.region_box_mm[0][2] == pytest.approx(500.0 * (heights.min() + heights.max()), abs=0.06)
+        assert after.part.region_box_mm[0][2] == pytest.approx(20.0, abs=0.06)
         assert (after.axis, after.placement) == (each.axis, each.placement)
 
 

@@ -37,6 +37,26 @@ def test_nearer_passes_are_those_that_leave_as_little_as_was_asked(tmp_path):
     job.with_(**found[0].changes)
 
 
+@pytest.mark.parametrize(
+    ("cleared", "shares"), [((0.31, 0.6, 1.0), [0.7, 0.5, 0.3]), ((0.45, 1.0), [0.7, 0.5, 0.3]), ((0.25, 1.0), [0.7])]
+)
+def test_passes_come_nearer_only_as_long_as_the_nearest_may_clear_all(cleared, shares, tmp_path, monkeypatch):
+    """Passes of the job clear these shares of parts of the region, nearer ones more, in proportion."""
+
+    def left(_, changes, *__):
+        share = changes.get("toolpath", {}).get("stepover_mm", 3.0) / 3.0
+        if "tool" not in changes:
+            tried.append(share)
+        return sum(max(1.0 - each / share, 0.0) for each in cleared) / len(cleared)
+
+    tried: list[float] = []
+    monkeypatch.setattr(FailedClaims, "_left", left)
+    _, found, told = trials(tmp_path, "passes too far apart", surface_left.CLAIMS[0], 40.0)
+    assert [each for each in dict.fromkeys(tried) if each < 1.0] == pytest.approx(shares)
+    assert any("stepover_mm" in each.changes.get("toolpath", {}) for each in found) == (min(cleared) > min(shares))
+    assert told.count("a smaller cutter") == 1
+
+
 @pytest.mark.slow
 def test_what_a_run_of_an_end_has_tried_by_itself_is_not_tried_again(tmp_path):
     job = Job.load(REFUSED["passes too far apart"].write(tmp_path))

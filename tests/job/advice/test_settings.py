@@ -8,19 +8,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pentapod.base.refusal import Shortfall
 from pentapod.geometry.directions import normalised
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.job import Job
 from pentapod.job.advice.axes import axis_choices
 from pentapod.job.advice.options import OPTIONS
 from pentapod.job.advice.parts import Regions
-from pentapod.job.advice.settings import Setting, Settings
+from pentapod.job.advice.settings import Setting, Settings, met_below
 from pentapod.job.advice.sketch import Sketch
 from pentapod.job.build.tool import job_tool
 from pentapod.job.build.toolpath import job_toolpath
 from pentapod.job.build.values import job_machine, job_mesh
 from pentapod.mesh.query.distance import MeshDistance
 from pentapod.planning.problem.constraints import FREE
+from pentapod.toolpath.toolpath import SegmentKind
 from refused_jobs import REFUSED
 
 JAMMED = replace(REFUSED["thick legs"], edits=(("leg_diameter_mm = 16", "leg_diameter_mm = 60"),))
@@ -31,6 +33,31 @@ def loaded(folder, name):
     job = Job.load((JAMMED if name == "jammed" else REFUSED[name]).write(folder))
     machine, mesh = job_machine(job), job_mesh(job)
     return job, machine, mesh, job_tool(job, machine)
+
+
+@pytest.mark.parametrize(("kind", "corner"), [("ball", None), ("bull", 1.0), ("flat", None)])
+@pytest.mark.parametrize("axis", [{"mode": "normal"}, {"mode": "fixed", "direction": [0.0, 0.0, 1.0]}])
+def test_heights_where_the_tool_touches_the_part_are_those_of_contacts(kind, corner, axis, tmp_path):
+    """On a sphere about the origin they follow from the slope; an upright end may touch anywhere on its rounding."""
+    job = Job.load(REFUSED["dome of 55 deg, flat end"].write(tmp_path))
+    job = job.with_(tool={"type": kind, "corner_mm": corner}, axis={**axis, "tilt_deg": None})
+    mesh = job_mesh(job)
+    path, _ = job_toolpath(job, mesh)
+    starts, kinds = path.starts, [segment.kind for segment in path.segments]
+    cut = max(np.flatnonzero([kind is SegmentKind.CUT for kind in kinds]), key=lambda k: starts[k + 1] - starts[k])
+    rows = range(int(starts[cut]) + 1, int(starts[cut + 1]))
+    short = [Shortfall("spindle touches the part", ((rows[0], rows[-1]),), 1.0, "mm")]
+    highest = met_below(job, mesh, path, short, OPTIONS)[-1]
+    tips, rounding = path.tips[rows], {"ball": 3e-3, "bull": 1e-3, "flat": 0.0}[kind]
+    if axis["mode"] == "normal":
+        assert highest == pytest.approx(tips[:, 2].max(), abs=1e-9)
+        return
+    if kind == "ball":
+        assert highest == pytest.approx(40.0 / 43.0 * (tips[:, 2].max() + rounding), abs=5e-5)
+        return
+    across = np.linalg.norm(tips[:, :2], axis=1) - (3e-3 - rounding)  # of the middle of the rounding
+    contacts = 40e-3 * np.sqrt(1.0 - (across / (40e-3 + rounding)) ** 2)
+    assert contacts.max() - 5e-5 <= highest <= contacts.max() + rounding + 5e-5
 
 
 @pytest.mark.parametrize(("name", "never"), [("jammed", "legs "), ("narrow base cones", "")])

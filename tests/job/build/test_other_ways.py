@@ -223,11 +223,13 @@ def test_a_way_that_failed_tells_what_it_left_where_nothing_else_was_wrong(job):
 
 
 def test_a_way_that_failed_tells_the_heights_at_which_the_tool_meets_the_part_where_nothing_else_was_wrong(job):
-    path = job_toolpath(job, job_mesh(job))[0]
+    mesh = job_mesh(job)
+    path = job_toolpath(job, mesh)[0]
 
     def way(*limits):
         failed = failing(job, limits=limits)
-        return FailedWay.of(replace(failed, stages=(Stage("toolpath", 0.0, (path, "")), *failed.stages)))
+        stages = Stage("mesh", 0.0, mesh), Stage("toolpath", 0.0, (path, ""))
+        return FailedWay.of(replace(failed, stages=(*stages, *failed.stages)))
 
     assert way("spindle touches the part").meets[-1] == pytest.approx(path.tips[:10, 2].max())
     assert way("spindle touches the part", "leg 1 too long").meets == ()

@@ -138,9 +138,8 @@ class FailedClaims:
         if self._accepted <= (self.options.little if long else self.options.hardly):
             yield from self._as_left()
             accepted = True
-        for words, changes in self._finer():
-            self.tell(words)
-            if self._left(changes) <= most:
+        for words, changes, left in self._finer():
+            if left <= most:
                 yield Trial(words, changes, 1.0, 1.0)
                 if not accepted:  # the other ways cost a plan each, and are much like the one that failed
                     yield from self._as_left()
@@ -177,14 +176,17 @@ class FailedClaims:
             left = own
         return _longer(1e-2 * self.options.more * left) if left > 0.0 else np.inf
 
-    def _finer(self) -> Iterator[tuple[str, Changes]]:
-        """Yield waterlines on walls, passes nearer together with the same bound of what is left, a smaller cutter."""
+    def _finer(self) -> Iterator[tuple[str, Changes, float]]:
+        """Yield waterlines on walls, passes nearer together with the same bound of what is left, a smaller cutter.
+
+        Each with the share of the region on which it leaves too much.
+        """
         table = self.job.toolpath
         region, steep = self._coverage.region, self.options.steep_deg
         view = normalised(self.job.part.si.region_direction)
         walls = None if region is None else region.steeper(view, to_si(steep, "deg"))
         if walls is not None and len(walls.faces) and getattr(table, "steep_deg", steep) is None:
-            yield "waterlines on what is steep", {"toolpath": {"steep_deg": steep}}
+            yield self._estimated("waterlines on what is steep", {"toolpath": {"steep_deg": steep}})
         key = "stepover_mm" if getattr(table, "stepover_mm", None) is not None else "scallop_mm"
         if getattr(table, key, None) is None:
             return
@@ -199,12 +201,23 @@ class FailedClaims:
 
         # A run goes back for passes that are nearer together by itself, and it was not enough.
         tried = min(NEARER) if may_come_nearer(self.job, self.failed[_LEFT]) else 1.0
-        for share in (each for each in self.options.nearer if each < tried):
-            yield "passes nearer together", nearer(share)
+        shares = [each for each in self.options.nearer if each < tried]
+        for share in shares:
+            yield (trial := self._estimated("passes nearer together", nearer(share)))
+            # Where passes clear a share c of the area they clear c / share of it when they are nearer together. So the
+            # nearest passes can clear all of it only where c is at least their own share.
+            least = (1.0 - min(shares) / share) / (1.0 - min(shares))
+            if trial[2] > least * self._left({}, self.toolpath):
+                break
         if isinstance(self._tool, BallEnded):
             share = self.options.thinner
             diameter = _shorter(share * self.job.tool.diameter_mm)
-            yield "a smaller cutter", merged(nearer(share), {"tool": {"diameter_mm": diameter}})
+            yield self._estimated("a smaller cutter", merged(nearer(share), {"tool": {"diameter_mm": diameter}}))
+
+    def _estimated(self, words: str, changes: Changes) -> tuple[str, Changes, float]:
+        """Return a trial's words and changes, and about the share of the region on which it leaves too much."""
+        self.tell(words)
+        return words, changes, self._left(changes)
 
     @cached_property
     def _coverage(self) -> Coverage:

@@ -40,10 +40,11 @@ class AdviceOptions(Value):
     its area. hopeless: estimated margin of the flattest part of a wide region, with a share `flattest` of its area,
     below which no toolpath of it is made. cuts: places of a toolpath of which smaller regions hold some. top_deg: angle
     of the region within which a place is flat, where only the top is tried; nearly_all: share of the places where the
-    tool or the spindle touch the part that lie below the first height that is tried. shallow: first depth of it, as a
-    share of the region's. flat: height, as a share of the largest extent, below which a box keeps it. least: smallest
-    extent of a box, and smallest scale, as shares of what is within reach. spare: share of the extent, or of the scale,
-    that is found and taken; the estimate looks at few points. smaller: factor on the extent of a second, smaller box.
+    tool or the spindle touch the part that lie below the first height that is tried; rise: by how much a box begins
+    higher, metres, so that its lowest pass has room. shallow: first depth of it, as a share of the region's. flat:
+    height, as a share of the largest extent, below which a box keeps it. least: smallest extent of a box, and smallest
+    scale, as shares of what is within reach. spare: share of the extent, or of the scale, that is found and taken; the
+    estimate looks at few points. smaller: factor on the extent of a second, smaller box.
     doubtful: width of a part, as a multiple of the work volume's, beyond which its unit is doubted. strategies: that
     are tried where another makes no toolpath. worth_length: what another tool counts beside a region that keeps a share
     of the area. other_face_deg: turn of a part on a table from which it lies on another face. steep_deg: slope from
@@ -81,6 +82,7 @@ class AdviceOptions(Value):
     flattest: float = 0.9
     top_deg: float = 40.0
     nearly_all: float = 0.99
+    rise: float = 0.5e-3
     shallow: float = 0.2
     flat: float = 0.1
     least: float = 0.1

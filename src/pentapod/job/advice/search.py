@@ -110,7 +110,7 @@ def advised(
     because, last = (lambda words: reasons.update({words: None}), lambda: ended[-1])
     own = partial(
         Trials, because=because, ended=last, placed=toolpath is not None and not short, otherwise=otherwise,
-        meets=met_below(job, toolpath, short, options) or meets,
+        meets=met_below(job, mesh, toolpath, short, options) or meets,
     )  # fmt: skip
     trials = _trials(job, machine, mesh, toolpath, options, tell, own, partial(Trials, because=because, ended=last))
     at_last: Iterable[Trial] = ()

@@ -51,16 +51,21 @@ def touches_the_part(each: Shortfall) -> bool:
 
 
 def met_below(
-    job: Job, toolpath: Toolpath | None, short: Sequence[Shortfall], options: AdviceOptions
+    job: Job, mesh: Mesh | None, toolpath: Toolpath | None, short: Sequence[Shortfall], options: AdviceOptions
 ) -> tuple[float, ...]:
     """Return heights along the region's direction, metres, below which the tool or the spindle touches the part.
 
-    Below the first are nearly all such places, below the last are all. Empty where a placement has other shortfalls.
+    They are heights of the cutter's contacts, since a region's box bounds these. Below the first are nearly all such
+    places, below the last are all. Empty where a placement has other shortfalls.
     """
-    if toolpath is None or not short or not all(touches_the_part(each) for each in short):
+    if mesh is None or toolpath is None or not short or not all(touches_the_part(each) for each in short):
         return ()
     rows = np.concatenate([np.arange(a, b + 1) for each in short for a, b in each.waypoints])
-    heights = toolpath.tips[rows] @ normalised(job.part.si.region_direction)
+    tool = job_tool(job)
+    contacts = Sketch.of_waypoints(job, mesh, tool, toolpath, rows).contacts
+    heights = contacts @ normalised(job.part.si.region_direction)
+    if tool.tilt_centre == 0.0 and job.axis.mode not in ("normal", "auto"):  # contacts are on the rounding of the end
+        heights = heights + (tool.scallop_radius or 0.0)
     return tuple(dict.fromkeys(np.quantile(heights, (options.nearly_all, 1.0)).tolist()))
 
 

@@ -40,7 +40,11 @@ class Sketch:
     @classmethod
     def of_toolpath(cls, job: Job, mesh: Mesh, tool: Tool, toolpath: Toolpath, count: int) -> Self:
         """Return a sketch of about `count` waypoints of a job's toolpath."""
-        rows = ToolpathSamples.of(toolpath, 0.0).representatives(count)
+        return cls.of_waypoints(job, mesh, tool, toolpath, ToolpathSamples.of(toolpath, 0.0).representatives(count))
+
+    @classmethod
+    def of_waypoints(cls, job: Job, mesh: Mesh, tool: Tool, toolpath: Toolpath, rows: Ints) -> Self:
+        """Return a sketch of waypoints (N,) of a job's toolpath."""
         return cls._at(job, mesh, tool, toolpath, rows, _cutting(toolpath)[rows])
 
     @classmethod

@@ -123,7 +123,8 @@ class Trials:
             return
         if last.stage != "placement":
             self._programmed.append(setting)
-        if last.failed == LEFT_ALONE:
+        # Axes that may lean do so in another way in another place.
+        if last.failed == LEFT_ALONE or (last.meets and setting.found.samples.tilt == 0.0):
             self._failing.add(setting.axis.words)
 
     @cached_property
@@ -133,7 +134,7 @@ class Trials:
 
     @cached_property
     def _failing(self) -> set[str]:
-        """Words of tool axes with which too much is left, wherever the part is placed."""
+        """Words of tool axes with which too much is left, or the tool touches the part, wherever that is placed."""
         return {""} if self.otherwise == LEFT_ALONE else set()
 
     def _scarcely(self, own: bool) -> Iterator[Trial]:
@@ -203,7 +204,8 @@ class Trials:
         """Yield what is higher than the places where the tool or the spindle touch the part."""
         for height in heights:
             self.settings.tell("only what is higher")
-            if self._all_regions is not None and (smaller := self._all_regions.above(height)) is not None:
+            regions = self._all_regions
+            if regions is not None and (smaller := regions.above(height + self.options.rise)) is not None:
                 own = Trial(smaller.words, smaller.changes, smaller.share, smaller.share)
                 yield own if base is None else self._of_region(base, smaller)
 

@@ -170,7 +170,7 @@ def tried_of(outcome: Outcome) -> Tried:
         return Tried(None, outcome.margin)
     refusal, way, meets = outcome.refusal, outcome.find(FailedWay), tuple[float, ...]()
     if refusal is not None and refusal.stage == "placement":
-        meets = met_below(outcome.job, outcome.find(Toolpath), refusal.diagnosis, OPTIONS)
+        meets = met_below(outcome.job, outcome.find(Mesh), outcome.find(Toolpath), refusal.diagnosis, OPTIONS)
     stage = "verdict" if refusal is None else refusal.stage
     return Tried(stage, failed=frozenset(failures(outcome.verdict)) if way is None else way.claims, meets=meets)
 
