@@ -124,7 +124,8 @@ def _contour(tree: FacetTree, nodes: Nodes, blocks: _Blocks, wide: Bools, distan
     if blocks.cut.any():
         lower = cells.grid.nodes(nodes.keys[edges.first[crossed]])
         crossed = crossed[blocks.holds(lower, edges.axes[crossed], cells.parts)]
-    rows, axes, lengths = edges.first[crossed], edges.axes[crossed], edges.lengths[crossed]
+    rows = edges.first[crossed]
+    axes, lengths = (of_edges[crossed].astype(np.intp) for of_edges in (edges.axes, edges.lengths))
     starts = cells.grid.points(nodes.keys[rows])
     points, normals = np.empty_like(starts), np.empty_like(starts)
     metres = (cells.grid.step * lengths).astype(np.float64)

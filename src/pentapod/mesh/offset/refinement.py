@@ -69,24 +69,25 @@ class Nodes:
         return cls(Cells(grid, 1, np.empty(0, dtype=np.intp)), keys, outside, every, ~every)
 
     def edges(self) -> Edges:
-        """Return the shortest edges between known nodes: none that is made of shorter ones."""
+        """Return the shortest edges between known nodes of which one or both are outside: none of shorter ones."""
         found: list[tuple[Ints, Ints, int, int]] = []
         strides, parts = self.cells.grid.strides, self.cells.parts
         for axis in range(3):
             for length, own in ((parts, self.whole), (1, self.fine))[: 2 if parts > 1 else 1]:
                 first = np.flatnonzero(own)
                 last = indices(self.keys, self.keys[first] + length * strides[axis])
-                joined = (last >= 0) & own[last]
+                joined = (last >= 0) & own[last] & (self.outside[first] | self.outside[last])
                 first, last = first[joined], last[joined]
-                if length > 1:
+                if length > 1 and len(self.cells.divided):
                     across = np.delete(strides, axis)
                     about = self.keys[first][:, None] - length * (_CORNERS[:4, 1:] @ across)
-                    undivided = ~np.isin(about, self.cells.divided).any(axis=1)
+                    undivided = (indices(self.cells.divided, about) < 0).all(axis=1)
                     first, last = first[undivided], last[undivided]
                 found.append((first, last, axis, length))
         first, last = (np.concatenate([f[k] for f in found]) for k in (0, 1))
         counts = [len(f[0]) for f in found]
-        return Edges(first, last, np.repeat([f[2] for f in found], counts), np.repeat([f[3] for f in found], counts))
+        axes, lengths = (np.repeat(np.array([f[k] for f in found], dtype=np.int16), counts) for k in (2, 3))
+        return Edges(first, last, axes, lengths)
 
 
 def indices(keys: Ints, wanted: Ints) -> Ints:

@@ -18,11 +18,13 @@ from pentapod.numerics.threads import for_rows
 class HeightGridOptions:
     """facets_per_cell: on average. most_entries: of facets in cells; a coarser grid is made where there were more.
 
-    sideways: metres to both sides of a point at which `hides` looks. across: rays in each direction for areas.
+    margin: barycentric tolerance up to which a point beside a facet counts as on it. sideways: metres to both sides of
+    a point at which `hides` looks. across: rays in each direction for areas.
     """
 
     facets_per_cell: float = 2.0
     most_entries: int = 20_000_000
+    margin: float = 1e-9
     sideways: float = 1e-7
     across: int = 200
 
@@ -68,7 +70,7 @@ class HeightField:
         begins = np.searchsorted(key[order], np.arange(int(shape.prod()) + 1))
         return cell, shape, begins.astype(np.intp), self._seen[owner[order]]
 
-    def topmost(self, points: Floats, margin: float = 1e-9) -> tuple[Floats, Floats, Floats]:
+    def topmost(self, points: Floats, margin: float = OPTIONS.margin) -> tuple[Floats, Floats, Floats]:
         """Return the topmost surface points (N, 3) on the view lines through points (N, 3), normals there, and heights.
 
         Heights (N,) are metres along the view from the origin; −inf, with NaN points and normals, where the line meets
@@ -83,9 +85,14 @@ class HeightField:
         normals[there] = (weight * self.mesh.corner_normals[facets[there]]).sum(axis=1)
         return surface, normals, heights
 
-    def heights(self, points: Floats) -> Floats:
-        """Return the heights (N,) of `topmost` alone."""
-        return self._topmost(points, 1e-9)[0]
+    def above(self, points: Floats, heights: Floats) -> Bools:
+        """Return whether the topmost surface on the view lines through points (N, 3) is above heights (N,), metres."""
+        from pentapod.mesh.query.kernels.heightfield_kernels import any_above  # noqa: PLC0415  loads numba
+
+        local, found = points @ self._frame.T, np.empty(len(points), dtype=np.bool_)
+        given = self._grid[3], self._local, self.mesh.faces, self._doubled, OPTIONS.margin
+        for_rows(any_above, (local, heights, *self._facets_near(local[:, :2])), given, (found,))
+        return found
 
     def hides(self, points: Floats, slack: float) -> Bools:
         """Return whether the mesh lies above points (N, 3), along the view, by more than `slack` metres.
@@ -95,14 +102,13 @@ class HeightField:
         """
         sideways = OPTIONS.sideways * (0.83 * self._frame[0] + 0.56 * self._frame[1])
         height = points @ self.view + slack
-        sides = (self.heights(points + side) for side in (sideways, -sideways))
-        return np.logical_and(*(above > height for above in sides))
+        return np.logical_and(*(self.above(points + side, height) for side in (sideways, -sideways)))
 
     def front_area(self) -> float:
         """Return about the area, square metres across the view, over which the mesh is seen from its front."""
         x, y = (self._low[k] + (np.arange(OPTIONS.across) + 0.5) / OPTIONS.across * self._extent[k] for k in range(2))
         points = np.stack([k.ravel() for k in np.meshgrid(x, y)], axis=1) @ self._frame[:2]
-        facets = self._topmost(points, 1e-9)[1]
+        facets = self._topmost(points, OPTIONS.margin)[1]
         front = self.mesh.facet_normals[facets[facets >= 0]] @ self.view > 0.0
         return float(front.sum() / len(points) * self._extent.prod())
 

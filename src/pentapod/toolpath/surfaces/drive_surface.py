@@ -110,7 +110,7 @@ class DriveSurface(RolledSurface):
             x, y = (step * self.radius * side for side in tangent_frame(self.view))
             around = (0.83 * x + 0.56 * y, 0.56 * x - 0.83 * y)
             for aside in (*around, *(-one for one in around)):
-                hidden[hidden] = self.field.heights(points[hidden] + aside) > height[hidden]
+                hidden[hidden] = self.field.above(points[hidden] + aside, height[hidden])
         if self.lowered:  # in narrow bores the mesh is too coarse to tell
             rows, top = np.flatnonzero(hidden), float((self.mesh.vertices @ self.view).max(initial=-np.inf))
             out = points[rows] + np.maximum(top - points[rows] @ self.view, 0.0)[:, None] * self.view

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pentapod.base.arrays import Floats, Ints
+from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.numerics.kernels import kernel
 
 
@@ -44,3 +44,37 @@ def topmost_facets(
             if height > heights[q] or (height == heights[q] and f < found[q]):
                 heights[q], found[q] = height, f
                 weights[q, 0], weights[q, 1], weights[q, 2] = first, second, third
+
+
+@kernel
+def any_above(
+    points: Floats,
+    bounds: Floats,
+    begins: Ints,
+    counts: Ints,
+    facets: Ints,
+    vertices: Floats,
+    faces: Ints,
+    doubled: Floats,
+    margin: float,
+    above: Bools,
+) -> None:
+    """Fill whether any facet over points (N, 2) is higher than bounds (N,). Else as `topmost_facets`."""
+    for q in range(len(points)):
+        x, y, bound = points[q, 0], points[q, 1], bounds[q]
+        above[q] = False
+        for k in range(begins[q], begins[q] + counts[q]):
+            f = facets[k]
+            a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+            if max(vertices[a, 2], vertices[b, 2], vertices[c, 2]) <= bound:
+                continue
+            ax, ay, bx, by = vertices[a, 0], vertices[a, 1], vertices[b, 0], vertices[b, 1]
+            cx, cy, area = vertices[c, 0], vertices[c, 1], doubled[f]
+            first = ((cx - bx) * (y - by) - (cy - by) * (x - bx)) / area
+            second = ((ax - cx) * (y - cy) - (ay - cy) * (x - cx)) / area
+            third = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / area
+            if not (first >= -margin and second >= -margin and third >= -margin):
+                continue
+            if first * vertices[a, 2] + second * vertices[b, 2] + third * vertices[c, 2] > bound:
+                above[q] = True
+                break
