@@ -20,6 +20,8 @@ _ROUNDS = 50
 _EXACT = 1e-15
 _TIE = 1e-12
 """Metres: of places at the same height, the nearest to the axis counts as touched."""
+_CLOSE = 1e-12
+"""Share of the squared size of a facet by which the place that holds a cutter may seem to be inside an edge."""
 
 
 @kernel
@@ -40,32 +42,6 @@ def _touch(
     if height > best + _TIE or (qx - x) ** 2 + (qy - y) ** 2 < (touch[0] - x) ** 2 + (touch[1] - y) ** 2:
         touch[0], touch[1], touch[2], touch[3] = qx, qy, qz, steep
     return max(best, height)
-
-
-@kernel
-def _on_facet(p: Floats, x: float, y: float, radius: float, disc: float, best: float, touch: Floats) -> float:
-    """Return `best`, or the disc's height at (x, y) where the cutter rests higher on the inside of a facet (3, 3)."""
-    bx, by, bz = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
-    cx, cy, cz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
-    nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-    length = math.copysign(math.sqrt(nx * nx + ny * ny + nz * nz), nz)
-    if nz == 0.0:
-        return best
-    nx, ny, nz = nx / length, ny / length, nz / length
-    flat = math.sqrt(nx * nx + ny * ny)
-    # The place of the disc that is nearest to the facet, and the point below it.
-    if flat > 0.0:
-        x0, y0 = x - disc * nx / flat - p[0, 0], y - disc * ny / flat - p[0, 1]
-    else:
-        x0, y0 = x - p[0, 0], y - p[0, 1]
-    px, py = x0 - radius * nx, y0 - radius * ny
-    first = bx * py - by * px
-    second = (cx - bx) * (py - by) - (cy - by) * (px - bx)
-    third = cy * px - cx * py
-    if min(first, second, third) < 0.0 < max(first, second, third):
-        return best
-    height = p[0, 2] + (radius - nx * x0 - ny * y0) / nz
-    return _touch(best, height, p[0, 0] + px, p[0, 1] + py, height - radius * nz, flat, x, y, touch)
 
 
 @kernel
@@ -110,35 +86,78 @@ def _reach_along(aside: float, slope: float, radius: float, disc: float) -> floa
 
 
 @kernel
-def _on_edge(a: Floats, b: Floats, x: float, y: float, radius: float, disc: float, best: float, touch: Floats) -> float:
-    """Return `best`, or the disc's height at (x, y) where the cutter rests higher on an edge or its end a (3,)."""
-    wx, wy, dx, dy = x - a[0], y - a[1], b[0] - a[0], b[1] - a[1]
-    out = math.sqrt(wx * wx + wy * wy)
-    rise = _rise(out, radius, disc)
+def _on_vertex(a: Floats, x: float, y: float, radius: float, disc: float, best: float, touch: Floats) -> float:
+    """Return `best`, or the disc's height at (x, y) where the cutter rests higher on a vertex (3,)."""
+    out = math.sqrt((x - a[0]) ** 2 + (y - a[1]) ** 2)
     steep = max(out - disc, 0.0) / radius if radius > 0.0 else 0.0
-    best = _touch(best, a[2] + rise, a[0], a[1], a[2], steep, x, y, touch)
+    return _touch(best, a[2] + _rise(out, radius, disc), a[0], a[1], a[2], steep, x, y, touch)
+
+
+@kernel
+def _on_edge(a: Floats, b: Floats, x: float, y: float, radius: float, disc: float, best: float, touch: Floats) -> float:
+    """Return `best`, or the disc's height at (x, y) where the cutter rests higher on an edge from a (3,) to b (3,)."""
+    wx, wy, dx, dy = x - a[0], y - a[1], b[0] - a[0], b[1] - a[1]
     length = math.sqrt(dx * dx + dy * dy)
-    if length > 0.0:
-        dx, dy = dx / length, dy / length
-        aside = abs(wx * dy - wy * dx)
-        if aside < radius + disc:
-            along, slope = wx * dx + wy * dy, (b[2] - a[2]) / length
-            reach = math.copysign(_reach_along(aside, abs(slope), radius, disc), slope)
-            # Of a level edge the nearest place.
-            at = along + reach if reach != 0.0 else min(max(along, 0.0), length)
-            if 0.0 <= at <= length:
-                out = math.sqrt(aside * aside + (at - along) ** 2)
-                qz = a[2] + at * slope
-                if radius > 0.0:
-                    steep = min(max(out - disc, 0.0) / radius, 1.0)
-                elif reach != 0.0:
-                    out, steep = disc, abs(slope) * disc / abs(reach)
-                    steep = steep / math.sqrt(1.0 + steep * steep)
-                else:
-                    steep = 0.0
-                best = _touch(
-                    best, qz + _rise(out, radius, disc), a[0] + at * dx, a[1] + at * dy, qz, steep, x, y, touch
-                )
+    if length == 0.0:
+        return _on_vertex(a if a[2] > b[2] else b, x, y, radius, disc, best, touch)
+    dx, dy = dx / length, dy / length
+    aside = abs(wx * dy - wy * dx)
+    if aside >= radius + disc:
+        return best
+    along, slope = wx * dx + wy * dy, (b[2] - a[2]) / length
+    reach = math.copysign(_reach_along(aside, abs(slope), radius, disc), slope)
+    # Of a level edge the nearest place.
+    at = along + reach if reach != 0.0 else min(max(along, 0.0), length)
+    if at <= 0.0 or at >= length:
+        return _on_vertex(a if at <= 0.0 else b, x, y, radius, disc, best, touch)
+    out = math.sqrt(aside * aside + (at - along) ** 2)
+    qz = a[2] + at * slope
+    if radius > 0.0:
+        steep = min(max(out - disc, 0.0) / radius, 1.0)
+    elif reach != 0.0:
+        out, steep = disc, abs(slope) * disc / abs(reach)
+        steep = steep / math.sqrt(1.0 + steep * steep)
+    else:
+        steep = 0.0
+    return _touch(best, qz + _rise(out, radius, disc), a[0] + at * dx, a[1] + at * dy, qz, steep, x, y, touch)
+
+
+@kernel
+def _on_facet(p: Floats, x: float, y: float, radius: float, disc: float, best: float, touch: Floats) -> float:
+    """Return `best`, or the disc's height at (x, y) where the cutter rests higher on a facet (3, 3).
+
+    The height at which a point of the facet's plane holds the cutter is a concave function of it. So the facet holds it
+    where the plane does, or on an edge beyond which that place is.
+    """
+    bx, by, bz = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]
+    cx, cy, cz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
+    nx, ny, nz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    side, length = math.copysign(1.0, nz), math.copysign(math.sqrt(nx * nx + ny * ny + nz * nz), nz)
+    if nz == 0.0:
+        for k in range(3):
+            best = _on_edge(p[k], p[(k + 1) % 3], x, y, radius, disc, best, touch)
+        return best
+    nx, ny, nz = nx / length, ny / length, nz / length
+    flat = math.sqrt(nx * nx + ny * ny)
+    # The place of the disc that is nearest to the facet, and the point below it.
+    if flat > 0.0:
+        x0, y0 = x - disc * nx / flat - p[0, 0], y - disc * ny / flat - p[0, 1]
+    else:
+        x0, y0 = x - p[0, 0], y - p[0, 1]
+    px, py = x0 - radius * nx, y0 - radius * ny
+    first = side * (bx * py - by * px)
+    second = side * ((cx - bx) * (py - by) - (cy - by) * (px - bx))
+    third = side * (cy * px - cx * py)
+    if min(first, second, third) >= 0.0:
+        height = p[0, 2] + (radius - nx * x0 - ny * y0) / nz
+        best = _touch(best, height, p[0, 0] + px, p[0, 1] + py, height - radius * nz, flat, x, y, touch)
+    close = _CLOSE * (bx * bx + by * by + cx * cx + cy * cy + px * px + py * py)
+    if first < close:
+        best = _on_edge(p[0], p[1], x, y, radius, disc, best, touch)
+    if second < close:
+        best = _on_edge(p[1], p[2], x, y, radius, disc, best, touch)
+    if third < close:
+        best = _on_edge(p[2], p[0], x, y, radius, disc, best, touch)
     return best
 
 
@@ -193,8 +212,6 @@ def drop(
             if _bound_of_facet(corners[f], x, y, radius, disc) <= best:
                 continue
             best = _on_facet(corners[f], x, y, radius, disc, best, touch)
-            for k in range(3):
-                best = _on_edge(corners[f, k], corners[f, (k + 1) % 3], x, y, radius, disc, best, touch)
         if first and best > least:
             break
     return best
