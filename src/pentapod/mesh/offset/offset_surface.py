@@ -17,6 +17,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -101,7 +102,7 @@ class _Blocks:
         cut = np.stack([low > 0, high < groups], axis=1)
         return cls(_GROUP * low, _GROUP * high, cut, np.zeros(3) if window is None else window.view)
 
-    def holds(self, nodes: Ints, axes: Ints, parts: int) -> Bools:
+    def holds(self, nodes: Ints, axes: npt.NDArray[np.int16], parts: int) -> Bools:
         """Return whether all cells about edges (E,) are among the blocks; nodes (E, 3): the edges' lower ones.
 
         parts: of a step along the sides of the grid's cells.

@@ -16,6 +16,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats, Ints
@@ -45,8 +46,8 @@ class Edges:
 
     first: Ints
     last: Ints
-    axes: Ints
-    lengths: Ints
+    axes: npt.NDArray[np.int16]
+    lengths: npt.NDArray[np.int16]
 
 
 @dataclass(frozen=True, eq=False)
