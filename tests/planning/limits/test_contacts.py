@@ -130,6 +130,12 @@ def test_margins_of_obstacles_that_are_large_enough_need_not_be_exact(enough, de
     assert (exact[:, own:] < enough).any()
 
 
+def test_no_pose_has_no_margins(desk, crowd, place):
+    """A program whose waypoints all keep what they had asks for none."""
+    margins = Margins.of(desk, PLUS, crowd)
+    assert margins(np.zeros((0, 3)), np.zeros((0, 3)), place).shape == (0, len(margins.limits))
+
+
 def test_a_waypoint_that_needs_room_has_smaller_margins_to_obstacles_alone(desk, crowd, place):
     tips = 0.02 * np.random.default_rng(6).normal(size=(30, 3)) + [0.06, 0.02, 0.01]
     samples = ToolpathSamples(tips, np.tile([0.0, 0.0, 1.0], (30, 1)), 0.0, TILT)

@@ -117,7 +117,7 @@ class Margins:
         known = None if gaps is None else gaps.reshape(-1, gaps.shape[-1])
         poses = tips.reshape(-1, 3), axes.reshape(-1, 3)
         outer = contacts(self.scene, *poses, placement, numbers=False, gaps=known, enough=enough).margins
-        return np.concatenate([own, outer.reshape(*own.shape[:-1], -1)], axis=-1)
+        return np.concatenate([own, outer.reshape(*own.shape[:-1], outer.shape[-1])], axis=-1)
 
     def own(self, tips: Floats, axes: Floats, block: int = BLOCK) -> Floats:
         """Return the margins (..., M) of the machine alone. block: poses at a time, to bound the memory.
