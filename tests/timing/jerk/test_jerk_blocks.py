@@ -1,6 +1,6 @@
 """Jerk limits solved in blocks: near the law of the whole, and within its limits."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -84,15 +84,39 @@ def test_blocks_find_the_law_of_the_whole(whole):
         assert np.quantile(np.abs(push[1] - push[0]).max(axis=1) / (2 * h) / JERK, 0.999) < 1.03
 
 
-def test_overlap_of_blocks_grows_until_they_agree(whole):
+def test_overlap_of_blocks_grows_where_they_disagree(whole, monkeypatch):
+    """Blocks beside cuts at which all agree are not solved again."""
     s, x, law = whole
-    blocked = limited(s, x, size=2500, overlap=8, blend=4, agreement=2e-7)
+    asked, solved, seam = [], JerkProblem.solved, JerkProblem.seam
+    monkeypatch.setattr(JerkProblem, "solved", lambda self, block: asked.append(block) or solved(self, block))
+
+    def strict(self, cut, overlap, *laws):
+        return None if cut == 5000 and overlap < 32 else seam(self, cut, overlap, *laws)
+
+    monkeypatch.setattr(JerkProblem, "seam", strict)
+    blocked = limited(s, x, size=2500, overlap=8, blend=4)
     assert blocked.overlap == 32
     assert duration(blocked) == pytest.approx(duration(law), rel=1e-3)
+    assert [block.begin for block in asked if block.low < block.begin - 8] == [5000, 5000]
+    assert len(asked) == 6 + 2 * 2
+
+
+def test_laws_that_differ_are_joined_where_no_limit_is_exceeded(whole):
+    """At a low speed a law may pass to one that differs by some percent; without room for that they do not agree."""
+    long, short = (
+        JerkProblem(*whole[:2], Waves(), np.empty(0), JerkOptions(blocks=BlockOptions(blend=blend)))
+        for blend in (128, 4)
+    )
+    (block,) = long.blocks([])
+    one = long.solved(block)
+    other = replace(one, y=0.9 * one.y)
+    low, high = long.seam(7000, 1024, one, other)
+    assert high - low == pytest.approx(128e-4)
+    assert short.seam(7000, 64, one, other) is None
 
 
 def test_blocks_that_never_agree_have_no_law(whole):
-    assert limited(*whole[:2], size=2500, overlap=512, agreement=0.0) == NO_AGREEMENT
+    assert limited(*whole[:2], size=2500, overlap=512, agreement=-1.0) == NO_AGREEMENT
 
 
 @pytest.mark.parametrize(("v", "w"), [(0.02, 0.0), (0.0, 0.03), (0.04, 0.02)])

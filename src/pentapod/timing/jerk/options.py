@@ -60,7 +60,7 @@ class BlockOptions(Value):
 
     size: int = 65_536  # gridpoints of a block
     overlap: int = 1_024  # gridpoints by which a block reaches beyond its cuts in the first attempt
-    agreement: float = 2e-3  # largest relative difference of ṡ² at which two blocks agree
+    agreement: float = 2e-3  # largest relative difference of ṡ², or share of a limit that passing adds, to agree
     blend: int = 128  # gridpoints over which the law passes from one block to the next
 
 

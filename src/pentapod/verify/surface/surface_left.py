@@ -107,14 +107,14 @@ def surface_left(replay: Replay) -> Finding | Idle:
     area = float(coverage.region.areas.sum())
     if not area > 0.0:
         return Idle("the region has no surface")
-    found = left_on(replay, coverage, coverage.region, cutting)
+    found = left_on(replay, coverage, coverage.region, cutting, OPTIONS.again)
     share, bound = 100.0 * found.missed / area, 100.0 * coverage.share
     place = replay.place(_nearest_sample(replay, found.place))
     beam = not cutting.cutter
     return Finding(share <= bound, share, bound, "%", place, _method(found, coverage, area, beam=beam))
 
 
-def left_on(motion: Motion, coverage: Coverage, region: Patch, cutting: Cutting, again: int = OPTIONS.again) -> _Left:
+def left_on(motion: Motion, coverage: Coverage, region: Patch, cutting: Cutting, again: int) -> _Left:
     """Return what a motion leaves on a region. again: as of the options."""
     solids, height = cutting.cutter, coverage.left
     chords = np.ones(len(motion.tilt_centres) - 1, dtype=np.bool_)
