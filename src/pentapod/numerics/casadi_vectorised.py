@@ -1,83 +1,79 @@
-"""Batch evaluation of a casadi function: its instructions carried out on NumPy arrays.
+"""Batch evaluation of a casadi function: its instructions carried out on many points, compiled.
 
-casadi's own `map` calls its virtual machine once for each point; here each instruction runs over a block of points. The
-instructions are the same, in the same order, so the numbers are casadi's, to the last bit where NumPy's elementary
-functions are the C library's.
+casadi's own `map` calls its virtual machine once for each point; here each instruction runs over a block of points, on
+all cores, which takes a fifth of the time. The instructions are the same, in the same order, so the numbers are
+casadi's to the last bit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from pentapod.base.arrays import Floats
-
-_BLOCK = 2048
-"""Points at a time: few enough that the values on their way stay in the cache."""
+from pentapod.numerics.threads import for_rows
 
 
 class Vectorised:
-    """A casadi function of SX expressions, callable with one array (rows, N) or column (rows, 1) for each input.
+    """A casadi function of SX expressions whose outputs are dense, callable with the numbers of many points.
 
-    Returns one array (rows, N) for each output, which must be dense. Raises NotImplementedError for an operation not
-    known here.
+    Called with the numbers of each input in casadi's column-major order: (N, numbers), or (numbers,) for all points.
+    Returns one array (N, numbers) for each output. Raises NotImplementedError for an operation not known here.
     """
 
     def __init__(self, function: Any) -> None:
         import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
-        unary, binary = _operations(ca)
-        self._sizes = [function.numel_out(k) for k in range(function.n_out())]
-        self._work = int(function.sz_w())
-        self._steps: list[tuple[Any, int, int, int]] = []
-        for k in range(function.n_instructions()):
-            code, into, of = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
-            if code == ca.OP_CONST:
-                self._steps.append((float(function.instruction_constant(k)), into[0], _CONSTANT, 0))
-            elif code == ca.OP_INPUT:
-                self._steps.append((of[0], into[0], _INPUT, of[1]))
-            elif code == ca.OP_OUTPUT:
-                self._steps.append((into[0], into[1], _OUTPUT, of[0]))
-            elif code in unary:
-                self._steps.append((unary[code], into[0], of[0], _UNARY))
-            elif code in binary:
-                self._steps.append((binary[code], into[0], of[0], of[1]))
+        # Only where kernels are used.
+        from pentapod.numerics.tape_kernels import OPERATIONS  # noqa: PLC0415
+
+        known = {getattr(ca, f"OP_{name}"): code for code, name in enumerate(OPERATIONS)}
+        inputs = _offsets([function.numel_in(k) for k in range(function.n_in())])
+        self._ends = _offsets([function.numel_out(k) for k in range(function.n_out())])
+        count = function.n_instructions()
+        codes, places, constants = np.empty(count, np.int64), np.zeros((3, count), np.int64), np.zeros(count)
+        for k in range(count):
+            operation = function.instruction_id(k)
+            if operation not in known:
+                raise NotImplementedError(f"casadi's operation {operation} has no counterpart here")
+            codes[k] = known[operation]
+            into, of = function.instruction_output(k), function.instruction_input(k)
+            if operation == ca.OP_INPUT:
+                places[:2, k] = into[0], inputs[of[0]] + of[1]
+            elif operation == ca.OP_OUTPUT:
+                places[:2, k] = self._ends[into[0]] + into[1], of[0]
+            elif operation == ca.OP_CONST:
+                places[0, k], constants[k] = into[0], function.instruction_constant(k)
             else:
-                raise NotImplementedError(f"casadi's operation {code} has no counterpart here")
+                places[:, k] = into[0], of[0], of[-1]
+        self._tape = (codes, *places, constants, int(function.sz_w()))
 
     def __call__(self, *inputs: Floats) -> list[Floats]:
         """Return the outputs at all points."""
-        (count,) = np.broadcast_shapes(*(x.shape[1:] for x in inputs))  # 0 where one of them has no point
-        out = [np.empty((size, count)) for size in self._sizes]
-        for first in range(0, count, _BLOCK):
-            part = slice(first, min(first + _BLOCK, count))
-            self._run([x if x.shape[1] == 1 else x[:, part] for x in inputs], out, part)
-        return out
+        # Only where kernels are used.
+        from pentapod.numerics.tape_kernels import run_tape  # noqa: PLC0415
 
-    def _run(self, inputs: list[Floats], out: list[Floats], part: slice) -> None:
-        work: list[Any] = [0.0] * self._work
-        with np.errstate(all="ignore"):  # branches that are not taken may divide by zero, as they do in casadi
-            for what, into, a, b in self._steps:
-                if a >= 0:
-                    work[into] = what(work[a]) if b == _UNARY else what(work[a], work[b])
-                elif a == _CONSTANT:
-                    work[into] = what
-                elif a == _INPUT:
-                    work[into] = inputs[what][b]
-                else:
-                    out[what][into, part] = work[b]
+        count = _count(inputs)
+        given, column = np.empty((count, sum(x.shape[-1] for x in inputs))), 0
+        for x in inputs:
+            given[:, column : column + x.shape[-1]] = x
+            column += x.shape[-1]
+        found = np.empty((count, self._ends[-1]))
+        for_rows(run_tape, (given,), self._tape, (found,))
+        return np.split(found, self._ends[1:-1], axis=1)
 
 
 class PointByPoint:
-    """The last output of a casadi function, dense, at a few points; evaluated in place, without copies.
+    """The last output of a casadi function, dense; as `Vectorised`, without what that takes to make for few points.
 
-    Called with the numbers of each input in casadi's column-major order: (N, numbers), or (numbers,) for all points.
-    Returns an array (N, numbers). Not to be called by two threads at a time.
+    casadi's virtual machine evaluates it in place until that has taken as long. Returns an array (N, numbers). Not to
+    be called by two threads at a time.
     """
 
     def __init__(self, function: Any) -> None:
+        self._function, self._left, self._made = function, POINTS, None
         self._given = [np.zeros(int(function.numel_in(k))) for k in range(function.n_in())]
         last = int(function.n_out()) - 1
         self._found = np.zeros(int(function.numel_out(last)))
@@ -88,9 +84,12 @@ class PointByPoint:
 
     def __call__(self, *inputs: Floats) -> Floats:
         """Return the output at all points."""
-        each = [np.atleast_2d(x) for x in inputs]
-        count = max(len(x) for x in each)
-        out = np.empty((count, len(self._found)))
+        count = _count(inputs)
+        self._left -= count
+        if self._left < 0:
+            self._made = self._made or Vectorised(self._function)
+            return self._made(*inputs)[-1]
+        each, out = [np.atleast_2d(x) for x in inputs], np.empty((count, len(self._found)))
         for k in range(count):
             for numbers, x in zip(self._given, each, strict=True):
                 numbers[:] = x[k if len(x) > 1 else 0]
@@ -99,39 +98,16 @@ class PointByPoint:
         return out
 
 
-_CONSTANT, _INPUT, _OUTPUT, _UNARY = -1, -2, -3, -4
+POINTS = 500
+"""Points after which instructions are worth reading: that takes as long as casadi takes for some 1,400 points."""
 
 
-def _operations(ca: Any) -> tuple[dict[int, Callable[..., Any]], dict[int, Callable[..., Any]]]:
-    """Return casadi's operation codes with what does the same on arrays: those of one argument, and of two."""
-    unary = {
-        ca.OP_ASSIGN: lambda a: a,
-        ca.OP_NEG: np.negative,
-        ca.OP_SQ: np.square,
-        ca.OP_TWICE: lambda a: 2.0 * a,
-        ca.OP_INV: lambda a: 1.0 / a,
-        ca.OP_SQRT: np.sqrt,
-        ca.OP_FABS: np.abs,
-        ca.OP_SIGN: np.sign,
-        ca.OP_NOT: lambda a: 1.0 * (a == 0.0),
-        ca.OP_SIN: np.sin,
-        ca.OP_COS: np.cos,
-        ca.OP_EXP: np.exp,
-        ca.OP_LOG: np.log,
-    }
-    binary = {
-        ca.OP_ADD: np.add,
-        ca.OP_SUB: np.subtract,
-        ca.OP_MUL: np.multiply,
-        ca.OP_DIV: np.divide,
-        ca.OP_FMIN: np.fmin,
-        ca.OP_FMAX: np.fmax,
-        ca.OP_LT: lambda a, b: 1.0 * (a < b),
-        ca.OP_LE: lambda a, b: 1.0 * (a <= b),
-        ca.OP_EQ: lambda a, b: 1.0 * (a == b),
-        ca.OP_NE: lambda a, b: 1.0 * (a != b),
-        ca.OP_AND: lambda a, b: 1.0 * ((a != 0.0) & (b != 0.0)),
-        ca.OP_OR: lambda a, b: 1.0 * ((a != 0.0) | (b != 0.0)),
-        ca.OP_IF_ELSE_ZERO: lambda a, b: np.where(np.not_equal(a, 0.0), b, 0.0),
-    }
-    return unary, binary
+def _count(inputs: Sequence[Floats]) -> int:
+    """Return the number of points."""
+    counts = {len(x) for x in inputs if x.ndim == 2}
+    return counts.pop() if counts else 1
+
+
+def _offsets(sizes: Sequence[int]) -> list[int]:
+    """Return where each of several arrays begins in one, and where the last ends."""
+    return [0, *np.cumsum(sizes).tolist()]

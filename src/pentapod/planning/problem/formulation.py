@@ -164,22 +164,21 @@ def placement_room(constraints: PlacementConstraints, *, free: bool = True) -> R
 def lean_slopes(problem: PlacementProblem, margins: Margins, transform: RigidTransform, kinds: Sequence[int]) -> Slopes:
     """Return the function (frames (n, 2, 3), leans in them (n, 2), waypoints (n,)) → margins' derivatives (n, K, 2)."""
     point = Vectorised(point_function(problem, margins, kinds, by="lean"))
-    rotation, translation = transform.rotation.T.reshape(-1, 1), transform.translation[:, None]
     samples = problem.samples
 
     def slopes(frames: Floats, leans: Floats, rows: Ints) -> Floats:
         touching = problem.contacts(margins, transform, np.einsum("nk,nkj->nj", leans, frames), rows)
         _, _, found = point(
-            np.zeros((6, 1)),
-            leans.T,
-            samples.tilt_centres[rows].T,
-            samples.nominal[rows].T,
-            frames.reshape(-1, 6).T,
-            rotation,
-            translation,
-            touching.T,
+            np.zeros(6),
+            leans,
+            samples.tilt_centres[rows],
+            samples.nominal[rows],
+            frames.reshape(-1, 6),
+            transform.rotation.T.ravel(),
+            transform.translation,
+            touching,
         )
-        return found.reshape(2, len(kinds), len(rows)).transpose(2, 1, 0)
+        return found.reshape(len(rows), 2, len(kinds)).transpose(0, 2, 1)
 
     return slopes
 

@@ -99,11 +99,11 @@ class AxisCost:
         self.weights, self.first = self.basis.data.reshape(-1, 4), self.basis.indices[::4].astype(np.intp)
         self.frames = self.spline.frames[nodes]
         self.given = (
-            samples.tilt_centres[nodes].T,
-            samples.nominal[nodes].T,
-            self.frames.reshape(-1, 6).T,
-            at.transform.rotation.T.reshape(-1, 1),
-            at.transform.translation[:, None],
+            samples.tilt_centres[nodes],
+            samples.nominal[nodes],
+            self.frames.reshape(-1, 6),
+            at.transform.rotation.T.ravel(),
+            at.transform.translation,
         )
         self.lengths = leg_function(problem, at.margins)
         self.legs = Vectorised(leg_function(problem, at.margins, slopes=True))
@@ -134,7 +134,7 @@ class AxisCost:
         tilt_centres, nominal, _, rotation, translation = self.given
         frames = self.frames.transpose(2, 0, 1).reshape(3, -1)
         legs = self.lengths.map(len(self.frames))(
-            leans, tilt_centres, nominal, frames, rotation.reshape(3, 3).T, translation
+            leans, tilt_centres.T, nominal.T, frames, rotation.reshape(3, 3).T, translation
         )
         rates = self.nominal_rates.T + ca.mtimes(leans, ca.DM(as_matrix(self.rate, len(self.frames)).T))
         bends = ca.mtimes(legs, ca.DM(as_matrix(self.bend, len(self.frames)).T))
@@ -191,8 +191,8 @@ class AxisCost:
 
     def _legs(self, c: Floats) -> tuple[Floats, Floats]:
         """Return leg lengths (n, n_legs) at the nodes and their derivatives (n, n_legs, 2) by the lean."""
-        legs, slopes = self.legs(self.spline.cone * (self.basis @ c).T, *self.given)
-        return legs.T, slopes.reshape(2, len(legs), -1).transpose(2, 1, 0)
+        legs, slopes = self.legs(self.spline.cone * (self.basis @ c), *self.given)
+        return legs, slopes.reshape(len(legs), 2, -1).transpose(0, 2, 1)
 
 
 def _both_ways(values: Floats) -> Floats:
