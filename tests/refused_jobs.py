@@ -186,11 +186,21 @@ STRICT = {"tilt_deg": 0.0}
 LARGE = {"toolpath": {"stepover_mm": 120.0, "spacing_mm": 30.0}, "feed": {"cut_mm_min": 20000.0}}
 SCANT = {"toolpath": {"stepover_mm": 300.0, "spacing_mm": 60.0}, "feed": {"cut_mm_min": 20000.0}}
 
+FINISHED: Tables = {
+    "toolpath": {"stepover_mm": 3.0, "spacing_mm": 2.0},
+    "feed": {"cut_mm_min": 1500.0},
+    "tolerance": {"chordal_mm": 0.01, "path_mm": 0.02, "left_share": 0.001},
+}
+"""As a user would have it; little may be left."""
+
 REFUSED: dict[str, Refused] = {
     # concave blocks, the tool along the normals
     **{f"{name} along normals": Refused(GENERATED[name], {}) for name in GENERATED if name != "egg_crate"},
     "block along normals": Refused(block(60.0, 40.0, 20.0), {}),
     "block of a first part": Refused(block(80.0, 60.0, 31.0), {"toolpath": {"stepover_mm": 10.0}}),
+    "block of a first part, finished": Refused(block(80.0, 60.0, 31.0), FINISHED),
+    "block whose walls a raster leaves": Refused(block(80.0, 60.0, 31.0), {**FINISHED, "axis": {"mode": "auto"}}),
+    "block with passes 70 mm apart": Refused(block(60.0, 40.0, 17.0), {**FINISHED, "toolpath": {"stepover_mm": 70.0}}),
     # domes too steep, cones too narrow
     "dome of 60 deg, no cone": Refused(cap(30.0, 60.0), {"axis": STRICT}),
     "dome of 75 deg": Refused(cap(30.0, 75.0), {}),

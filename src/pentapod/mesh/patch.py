@@ -157,6 +157,11 @@ class Patch:
         """Return the part whose normals are more than `angle` radians from `upright` (3,) and from its opposite."""
         return self.where_normals(lambda n: np.cos(angle) * np.linalg.norm(n, axis=-1) - np.abs(n @ upright))
 
+    def share_steeper(self, upright: Floats, angle: float) -> float:
+        """Return the share of the area of facets whose normals are more than `angle` radians from `upright` (3,)."""
+        steep = self.facet_normals @ upright < np.cos(angle)
+        return float(self.areas[steep].sum() / self.areas.sum())
+
     def above(self, values: Floats, bound: float) -> tuple[Patch, Floats]:
         """Return the part where a quantity (V,) is at least `bound`, and the quantity at its vertices."""
         at = values[self.faces] - bound

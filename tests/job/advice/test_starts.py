@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from pentapod.base.errors import InputError, JobError
@@ -33,6 +35,16 @@ def test_the_first_start_is_what_is_wrong(name, tmp_path):
     assert first.changes[table][key] == value
     assert first.words
     assert len(job_toolpath(first.job, first.mesh, machine=machine)[0]) > 2
+
+
+@pytest.mark.parametrize(("share", "begun"), [(0.001, [3.0, 10.0]), (1.0, [10.0])])
+def test_passes_further_apart_than_the_cutter_is_wide_are_begun_with_beside_each_other(share, begun, tmp_path):
+    """Not where all of the region may be left."""
+    tables = {"tolerance": {"left_share": share}}
+    job = Job.load(replace(REFUSED["dome of 60 deg, no cone"], tables=tables).write(tmp_path))
+    found = list(starts(job, job_machine(job), job_mesh(job), OPTIONS))
+    assert [each.job.toolpath.stepover_mm for each in found] == begun
+    assert found[-1].words == ""
 
 
 def test_a_part_beyond_the_reach_is_begun_with_as_it_is(tmp_path):

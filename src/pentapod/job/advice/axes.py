@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,9 @@ OF_MODES = ("direction", "point_mm", "line", "places_mm", "directions")
 
 _FROM_AXES = ("lead_deg", "side_deg")
 
+CHOSEN, WATERLINES = "the planner chooses the tool axis", "waterlines on what is steep"
+"""What is said of these changes."""
+
 
 @dataclass(frozen=True, eq=False)
 class AxisChoice:
@@ -50,6 +53,11 @@ def taken_out(job: Job, table: str, keys: tuple[str, ...]) -> dict[str, Any]:
     return {key: None for key in keys if key in given}
 
 
+def chosen_axis(job: Job) -> Changes:
+    """Return the changes by which the planner chooses the tool axis."""
+    return {"axis": {"mode": "auto", **taken_out(job, "axis", (*OF_MODES, *_FROM_AXES, "tilt_deg"))}}
+
+
 def axis_choices(
     job: Job, tool: Tool, sketch: Sketch, constraints: PlacementConstraints, options: AdviceOptions
 ) -> list[AxisChoice]:
@@ -65,14 +73,11 @@ def axis_choices(
     else:
         found = [AxisChoice("", {}, lambda s: [s.samples(s.axes, own)])]
         if own > 0.0:
-            # Beside a wall the stem is clear of it only upright; a raster does not cover all of a wall.
-            words, upright = "the tool does not lean", {"axis": {"tilt_deg": 0.0}}
-            slopes = angle_between(sketch.normals, normalised(job.part.si.region_direction))
-            walls = bool((slopes > to_si(options.steep_deg, "deg")).any())
-            if walls and getattr(job.toolpath, "steep_deg", options.steep_deg) is None:
-                words += ", waterlines on what is steep"
-                upright |= {"toolpath": {"steep_deg": options.steep_deg}}
-            found.append(AxisChoice(words, upright, lambda s: [s.samples(s.axes, 0.0)], narrow=True))
+            # Beside a wall the stem is clear of it only upright.
+            upright = AxisChoice(
+                "the tool does not lean", {"axis": {"tilt_deg": 0.0}}, lambda s: [s.samples(s.axes, 0.0)], narrow=True
+            )
+            found.append(_with_waterlines(upright, job, sketch, options))
     if job.toolpath.strategy != FILE:
         usual = AxisKeys().tilt if tool.can_tilt else 0.0
         # A cone that is given may be too narrow, or too wide for a tool that cannot tilt.
@@ -86,18 +91,25 @@ def axis_choices(
                 narrow = any(choice.changes.get("axis", {}).get("mode") == "fixed" for choice in found)
                 found.append(_fixed(job, direction, usual, cone, narrow=narrow))
         if lean > usual and axis.mode != "auto":
-            keys = taken_out(job, "axis", (*OF_MODES, *_FROM_AXES, "tilt_deg"))
-            found.append(
-                AxisChoice(
-                    "the planner chooses the tool axis", {"axis": {"mode": "auto", **keys}},
-                    lambda s: leaning(s.samples(s.normals, 0.0), lean, constraints),
-                )
-            )  # fmt: skip
+            chosen = AxisChoice(
+                CHOSEN, chosen_axis(job), lambda s: leaning(s.samples(s.normals, 0.0), lean, constraints)
+            )
+            found.append(_with_waterlines(chosen, job, sketch, options))
     if tool.can_tilt and axis.mode != "auto":
         wider = [deg for deg in options.cones_deg if deg > axis.tilt_deg]
         widest = None if any(choice.changes.get("axis", {}).get("mode") == "auto" for choice in found) else wider[-1:]
         found += [_wider(deg, narrow=widest != [deg]) for deg in wider]
     return found
+
+
+def _with_waterlines(choice: AxisChoice, job: Job, sketch: Sketch, options: AdviceOptions) -> AxisChoice:
+    """Return a choice with waterlines on walls, all of which the passes of a raster do not cover."""
+    slopes = angle_between(sketch.normals, normalised(job.part.si.region_direction))
+    steep, table = options.steep_deg, job.toolpath
+    if getattr(table, "steep_deg", steep) is not None or not (slopes > to_si(steep, "deg")).any():
+        return choice
+    changes = {**choice.changes, "toolpath": {"steep_deg": steep}}
+    return replace(choice, words=f"{choice.words}, {WATERLINES}", changes=changes)
 
 
 def _fixed(job: Job, direction: Floats, cone: float, others: dict[str, Any], *, narrow: bool) -> AxisChoice:

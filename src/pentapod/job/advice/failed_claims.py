@@ -18,7 +18,7 @@ from pentapod.base.units import from_si, to_si
 from pentapod.cutters.mounted import BallEnded
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import normalised
-from pentapod.job.advice.axes import OF_MODES, Changes, taken_out
+from pentapod.job.advice.axes import CHOSEN, OF_MODES, WATERLINES, Changes, chosen_axis, taken_out
 from pentapod.job.advice.options import AdviceOptions
 from pentapod.job.advice.parts import Regions
 from pentapod.job.advice.settings import Tell, Trial, merged
@@ -133,7 +133,7 @@ class FailedClaims:
 
     def _leaving_less(self) -> Iterator[Trial]:
         """Yield changes that leave less than the job now allows, where that can be estimated."""
-        most, accepted = self.options.surely * float(self.job.tolerance.left_share), False
+        most, accepted = self._most, False
         long = len(self.toolpath) > self.options.long
         if self._accepted <= (self.options.little if long else self.options.hardly):
             yield from self._as_left()
@@ -186,7 +186,11 @@ class FailedClaims:
         view = normalised(self.job.part.si.region_direction)
         walls = None if region is None else region.steeper(view, to_si(steep, "deg"))
         if walls is not None and len(walls.faces) and getattr(table, "steep_deg", steep) is None:
-            yield self._estimated("waterlines on what is steep", {"toolpath": {"steep_deg": steep}})
+            words, changes = WATERLINES, Changes(toolpath={"steep_deg": steep})
+            if self.job.axis.mode == "normal" and isinstance(self._tool, BallEnded):
+                # Normals all around are too much for most machines; an axis that is chosen may be the normal.
+                words, changes = f"{CHOSEN}, {words}", changes | chosen_axis(self.job)
+            yield self._estimated(words, changes)
         key = "stepover_mm" if getattr(table, "stepover_mm", None) is not None else "scallop_mm"
         if getattr(table, key, None) is None:
             return
@@ -228,6 +232,15 @@ class FailedClaims:
         """Share of the region that the ball leaves, but that the verdict does not count."""
         found = self.failed[_LEFT].value or 0.0
         return max(self._uncovered(self._coverage, self.job, self.toolpath) - 0.01 * found, 0.0)
+
+    @cached_property
+    def _most(self) -> float:
+        """Share of the region up to which a change is planned: what may be left, and what chance may add to it.
+
+        What the verdict does not count is estimated by points of the region, for the change as for the job.
+        """
+        deviation = np.sqrt(2.0 * self._unreached / self.options.surface_points)
+        return self.options.surely * float(self.job.tolerance.left_share) + self.options.deviations * float(deviation)
 
     def _left(self, changes: Changes, toolpath: Toolpath | None = None) -> float:
         """Return about the share of the region on which a job with changes leaves too much.

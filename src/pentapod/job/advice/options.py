@@ -48,14 +48,16 @@ class AdviceOptions(Value):
     doubtful: width of a part, as a multiple of the work volume's, beyond which its unit is doubted. strategies: that
     are tried where another makes no toolpath. worth_length: what another tool counts beside a region that keeps a share
     of the area. other_face_deg: turn of a part on a table from which it lies on another face. steep_deg: slope from
-    which walls get waterlines.
+    which walls get waterlines. beside: distance between passes, in cutters, where more than one cutter is asked for.
     Where a program fails its verdict: nearer, thinner, slower: factors on the distance between passes, on the cutter's
     diameter (with that distance), and on the feed; surface_points: of the region, at which it is estimated what is
-    left; near_share: steps along the toolpath, in radii of the ball; surely: share of what may be left that the
-    estimate must keep to; little: share of the region that may stay as it is, where nothing else helps; hardly: that
-    may before anything else is planned; long: waypoints from which other ways take minutes, so that `little` may
-    before; largest: that may where nothing else was found; more: what is allowed then, as a multiple of what is left;
-    about: up to this multiple of what another way leaves, the program as it is counts.
+    left; near_share: steps along the toolpath, in radii of the ball; beside: distance between passes, in the cutter's
+    diameters, where that asked for is larger than one; surely: share of what may be left that the estimate must keep
+    to; deviations: standard deviations by which it may be wrong; little: share of the region that may stay as it is,
+    where nothing else helps; hardly: that may before anything else is planned; long: waypoints from which other ways
+    take minutes, so that `little` may before; largest: that may where nothing else was found; more: what is allowed
+    then, as a multiple of what is left; about: up to this multiple of what another way leaves, the program as it is
+    counts.
     """
 
     wanted: int = 1
@@ -97,7 +99,9 @@ class AdviceOptions(Value):
     slower: float = 0.6
     surface_points: int = 20_000
     near_share: float = 0.05
+    beside: float = 0.5
     surely: float = 0.8
+    deviations: float = 3.0
     hardly: float = 0.005
     little: float = 0.02
     largest: float = 0.1

@@ -66,6 +66,8 @@ def starts(
     key = "region"
     if region:
         yield from _of_other_size(job, machine, mesh, options)
+        if (near := _passes_beside(job, mesh, options)) and isinstance(made := _with_toolpath(near, machine), Start):
+            yield made
         if has_toolpath or is_too_large(job, machine, mesh):
             yield own
             return
@@ -80,6 +82,19 @@ def starts(
         made = _with_toolpath(start, machine)
         if isinstance(made, Start):
             yield made
+
+
+def _passes_beside(job: Job, mesh: Mesh, options: AdviceOptions) -> Start | None:
+    """Return a job whose passes are further apart than its cutter is wide with passes beside each other; else None.
+
+    None as well where all of the region may be left.
+    """
+    wide, apart = getattr(job.tool, "diameter_mm", None), getattr(job.toolpath, "stepover_mm", None)
+    if wide is None or apart is None or apart <= wide or job.tolerance.left_share == 1.0:
+        return None
+    share = options.beside
+    changes: Changes = {"toolpath": {"stepover_mm": round(share * wide, 3)}}
+    return Start(f"passes {share:g} of the cutter's diameter apart", changes, job.with_(**changes), mesh)
 
 
 def _with_toolpath(start: Start, machine: Machine) -> Start | InputError:

@@ -72,12 +72,14 @@ def missed_by_drops(
 class ForesightOptions:
     """When a toolpath is refused, or not planned, since its program would fail its verdict.
 
+    walls_deg: slope from which surface is an upright wall: passes of a raster leave those that are parallel to them.
     certain: share of the length of cuts that is dropped from which the verdict would find the region missed; missed:
     estimated share of the region that is missed from which it would; leaves: share that a cutter leaves that keeps
     exactly to the toolpath. As multiples of the share of it that may be left.
     askew_deg: angle between a fixed axis and the direction that the region faces from which it is told.
     """
 
+    walls_deg: float = 80.0
     certain: float = 50.0
     missed: float = 2.0
     leaves: float = 1.5
@@ -118,6 +120,16 @@ def foreseen(
         if missed > options.missed * most:
             return Refusal(FORBIDDEN, f"{cause}: about {100.0 * missed:.2g} % of the region; {allowed}")
     return None
+
+
+def may_leave_walls(job: Job, cutting: Cutting | None, options: ForesightOptions = FORESIGHT) -> bool:
+    """Return whether the passes of a job may leave upright walls, since they are not machined in waterlines."""
+    if cutting is None or cutting.coverage is None or getattr(job.toolpath, "steep_deg", 0.0) is not None:
+        return False
+    region, coverage = cutting.coverage.region, cutting.coverage
+    if region is None or not len(region.faces):
+        return False
+    return region.share_steeper(coverage.up, float(np.radians(options.walls_deg))) > coverage.share
 
 
 def _askew(job: Job, options: ForesightOptions) -> str:

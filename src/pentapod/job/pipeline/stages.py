@@ -16,7 +16,7 @@ from pentapod.base.refusal import Refusal
 from pentapod.job.advice.options import OPTIONS, AdviceOptions, Tried
 from pentapod.job.advice.search import advised
 from pentapod.job.advice.settings import LEFT_ALONE, met_below, touches_the_part
-from pentapod.job.build.left import FORBIDDEN
+from pentapod.job.build.left import FORBIDDEN, may_leave_walls
 from pentapod.job.build.limits import timing_limits
 from pentapod.job.build.other_ways import made_upright, may_stand
 from pentapod.job.build.pieces import job_part
@@ -82,7 +82,7 @@ def planned(
         specification = dataclasses.replace(specification, setups=max(specification.setups, 2))
     left_out = () if before is None else before.made_from.left_out
     task = Task(job, specification, runner, piece, (*timing_limits(job, machine), *limits), claims, before, left_out)
-    attempt = Attempt(task, mesh, staging, writers, left_first)
+    attempt = Attempt(task, mesh, staging, writers, left_first or may_leave_walls(job, specification.cutting))
     if alone and covers_region(job):
         outcome = with_what_is_left(attempt, first_that_passes(attempt))
         return attempt if job is asked else attempt.with_task(job=asked), outcome  # advice is about the job as asked

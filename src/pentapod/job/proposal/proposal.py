@@ -222,8 +222,7 @@ def _toolpath(patch: Patch, direction: Floats) -> dict[str, Any]:
 
 def _walls(patch: Patch, direction: Floats) -> float:
     """Return the share of a region's area that is upright, about."""
-    upright = patch.facet_normals @ direction < np.cos(to_si(OPTIONS.walls_deg, "deg"))
-    return float(patch.areas[upright].sum() / patch.areas.sum())
+    return patch.share_steeper(direction, to_si(OPTIONS.walls_deg, "deg"))
 
 
 def _placement(mesh: Mesh, patch: Patch, direction: Floats, work: WorkVolume) -> dict[str, Any]:
