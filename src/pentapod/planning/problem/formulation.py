@@ -17,7 +17,7 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.arithmetic import Arithmetic
 from pentapod.kinematics.legs_on_line import LegsOnLine
-from pentapod.numerics.casadi_vectorised import PointByPoint, Vectorised
+from pentapod.numerics.tape.vectorised import PointByPoint, Vectorised
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.limits.tool_pose import joints_of
 from pentapod.planning.problem.constraints import PlacementConstraints

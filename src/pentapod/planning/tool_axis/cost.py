@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.numerics.casadi_vectorised import Vectorised
 from pentapod.numerics.convex.banded_qp import SoftRows
 from pentapod.numerics.divided_differences import as_matrix, differences, divided_differences
+from pentapod.numerics.tape.vectorised import Vectorised
 from pentapod.planning.problem.formulation import leg_function
 from pentapod.planning.problem.problem import Candidate, PlacementProblem
 from pentapod.planning.tool_axis.spline import BANDS, AxisSpline

@@ -10,10 +10,16 @@ from pentapod.base.arrays import Floats, Ints
 from pentapod.numerics.kernels import kernel
 
 OPERATIONS = (
-    "MUL", "ADD", "SUB", "DIV", "INPUT", "OUTPUT", "CONST", "NEG", "TWICE", "SQ", "IF_ELSE_ZERO", "LE", "LT", "FMAX",
-    "FMIN", "SQRT", "NOT", "INV", "FABS", "SIGN", "EQ", "NE", "AND", "OR", "ASSIGN", "SIN", "COS", "EXP", "LOG",
+    "MUL", "ADD", "SUB", "DIV", "INPUT", "OUTPUT", "CONST", "NEG", "TWICE", "SQ", "IF_ELSE_ZERO", "LE", "LT",
+    "FMAX", "FMIN", "SQRT", "NOT", "INV", "FABS", "SIGN", "EQ", "NE", "AND", "OR", "ASSIGN", "SIN", "COS", "EXP",
+    "LOG",
 )  # fmt: skip
 """casadi's names of the operations that are known; the place of a name is the operation's code in a tape."""
+
+(
+    MUL, ADD, SUB, DIV, INPUT, OUTPUT, CONST, NEG, TWICE, SQ, IF_ELSE_ZERO, LE, LT, FMAX, FMIN, SQRT, NOT, INV,
+    FABS, SIGN, EQ, NE, AND, OR, ASSIGN, SIN, COS, EXP, LOG,
+) = range(len(OPERATIONS))  # fmt: skip
 
 WIDTH = 64
 """Points at a time: each instruction then costs little more than its arithmetic, and values stay in the cache."""
@@ -33,50 +39,50 @@ def run_tape(  # noqa: PLR0912  a branch for each operation
         count = min(WIDTH, len(given) - begin)
         for i in range(len(codes)):
             code, c, a, b = codes[i], into[i], first[i], second[i]
-            if code == 0:
+            if code == MUL:
                 for j in range(count):
                     t[j] = work[a, j] * work[b, j]
-            elif code == 1:
+            elif code == ADD:
                 for j in range(count):
                     t[j] = work[a, j] + work[b, j]
-            elif code == 2:
+            elif code == SUB:
                 for j in range(count):
                     t[j] = work[a, j] - work[b, j]
-            elif code == 3:
+            elif code == DIV:
                 for j in range(count):
                     t[j] = work[a, j] / work[b, j]
-            elif code == 4:
+            elif code == INPUT:
                 for j in range(count):
                     t[j] = given[begin + j, a]
-            elif code == 5:
+            elif code == OUTPUT:
                 for j in range(count):
                     found[begin + j, c] = work[a, j]
                 continue
-            elif code == 6:
+            elif code == CONST:
                 for j in range(count):
                     t[j] = constants[i]
-            elif code == 7:
+            elif code == NEG:
                 for j in range(count):
                     t[j] = -work[a, j]
-            elif code == 8:
+            elif code == TWICE:
                 for j in range(count):
                     t[j] = 2.0 * work[a, j]
-            elif code == 9:
+            elif code == SQ:
                 for j in range(count):
                     t[j] = work[a, j] * work[a, j]
-            elif code == 10:
+            elif code == IF_ELSE_ZERO:
                 for j in range(count):
                     t[j] = work[b, j] if work[a, j] != 0.0 else 0.0
-            elif code == 11:
+            elif code == LE:
                 for j in range(count):
                     t[j] = 1.0 if work[a, j] <= work[b, j] else 0.0
-            elif code == 12:
+            elif code == LT:
                 for j in range(count):
                     t[j] = 1.0 if work[a, j] < work[b, j] else 0.0
-            elif code == 13:
+            elif code == FMAX:
                 for j in range(count):
                     t[j] = work[b, j] if work[b, j] > work[a, j] or work[a, j] != work[a, j] else work[a, j]
-            elif code == 14:
+            elif code == FMIN:
                 for j in range(count):
                     t[j] = work[b, j] if work[b, j] < work[a, j] or work[a, j] != work[a, j] else work[a, j]
             else:
@@ -89,30 +95,30 @@ def run_tape(  # noqa: PLR0912  a branch for each operation
 @kernel
 def _seldom(code: int, x: float, y: float) -> float:  # noqa: PLR0911, PLR0912  likewise
     """Return what an operation that is seldom gives: one of `OPERATIONS` from SQRT on."""
-    if code == 15:
+    if code == SQRT:
         return np.sqrt(x)
-    if code == 16:
+    if code == NOT:
         return 1.0 if x == 0.0 else 0.0
-    if code == 17:
+    if code == INV:
         return 1.0 / x
-    if code == 18:
+    if code == FABS:
         return abs(x)
-    if code == 19:
+    if code == SIGN:
         return -1.0 if x < 0.0 else 1.0 if x > 0.0 else x
-    if code == 20:
+    if code == EQ:
         return 1.0 if x == y else 0.0
-    if code == 21:
+    if code == NE:
         return 1.0 if x != y else 0.0
-    if code == 22:
+    if code == AND:
         return 1.0 if x != 0.0 and y != 0.0 else 0.0
-    if code == 23:
+    if code == OR:
         return 1.0 if x != 0.0 or y != 0.0 else 0.0
-    if code == 24:
+    if code == ASSIGN:
         return x
-    if code == 25:
+    if code == SIN:
         return math.sin(x)
-    if code == 26:
+    if code == COS:
         return math.cos(x)
-    if code == 27:
+    if code == EXP:
         return np.exp(x)
     return np.log(x)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from pentapod.geometry.rigid import RigidTransform
 from pentapod.kinematics.component import COMPONENTS
-from pentapod.numerics.casadi_vectorised import POINTS, PointByPoint, Vectorised
+from pentapod.numerics.tape.vectorised import POINTS, PointByPoint, Vectorised
 from pentapod.planning.limits.margins import Margins
 from pentapod.planning.problem.formulation import point_function
 from pentapod.planning.problem.problem import PlacementProblem

@@ -27,7 +27,7 @@ class Vectorised:
         import casadi as ca  # noqa: PLC0415  heavy: only when planning
 
         # Only where kernels are used.
-        from pentapod.numerics.tape_kernels import OPERATIONS  # noqa: PLC0415
+        from pentapod.numerics.tape.tape_kernels import OPERATIONS  # noqa: PLC0415
 
         known = {getattr(ca, f"OP_{name}"): code for code, name in enumerate(OPERATIONS)}
         inputs = _offsets([function.numel_in(k) for k in range(function.n_in())])
@@ -53,7 +53,7 @@ class Vectorised:
     def __call__(self, *inputs: Floats) -> list[Floats]:
         """Return the outputs at all points."""
         # Only where kernels are used.
-        from pentapod.numerics.tape_kernels import run_tape  # noqa: PLC0415
+        from pentapod.numerics.tape.tape_kernels import run_tape  # noqa: PLC0415
 
         count = _count(inputs)
         given, column = np.empty((count, sum(x.shape[-1] for x in inputs))), 0
