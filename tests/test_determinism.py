@@ -1,4 +1,4 @@
-"""The same job gives the same files, bit for bit, on one machine, however many threads the linear algebra runs on."""
+"""The same job gives the same files, bit for bit, on one machine, however many cores it uses, and linear algebra."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FREE = '[placement]\nthen = "force"\n'
         pytest.param("stepover_mm = 9\nspacing_mm = 4", FREE, id="free", marks=pytest.mark.slow),
     ],
 )
-def test_one_thread_or_two(make_job, tmp_path, passes, placement):
+def test_one_core_or_two(make_job, tmp_path, passes, placement):
     path = make_job(("tilt_deg = 0", "tilt_deg = 10"), ("stepover_mm = 15\nspacing_mm = 4", passes))
     if placement is not None:
         path.write_text(path.read_text().split("[placement]")[0] + placement)
@@ -34,7 +34,7 @@ def test_one_thread_or_two(make_job, tmp_path, passes, placement):
     for threads in ("1", "2"):
         out = tmp_path / threads
         environment = os.environ | dict.fromkeys(VARIABLES, threads)
-        subprocess.run([*COMMAND, str(path), "-o", str(out), "--quiet"], env=environment, check=True)
+        subprocess.run([*COMMAND, str(path), "-o", str(out), "--quiet", "-j", threads], env=environment, check=True)
         files.append(
             {name: (out / name).read_bytes() for name in ("program.csv", "plan.npz", "verdict.json", "report.html")}
         )

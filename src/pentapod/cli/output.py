@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -33,6 +34,22 @@ class HtmlFile(click.Path):
 def quiet_option(command: Command) -> Command:
     """Add --quiet: print errors only, and JSON with --json."""
     return click.option("-q", "--quiet", is_flag=True, help="Print errors only.")(command)
+
+
+def cores_option(command: Command) -> Command:
+    """Add -j: how many cores the command uses; threads below ask for that where they are begun."""
+
+    def use(_context: click.Context, _parameter: click.Parameter, count: int | None) -> None:
+        from pentapod.numerics.threads import CORES
+
+        if count is not None:
+            os.environ[CORES] = str(count)
+
+    text = "How many cores to use; all when left out. The result is the same, bit for bit."
+    option = click.option(
+        "-j", "--cores", type=click.IntRange(1), expose_value=False, callback=use, metavar="N", help=text
+    )
+    return option(command)
 
 
 def json_option(command: Command) -> Command:

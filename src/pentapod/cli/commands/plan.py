@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pentapod.cli.output import advice_text, echo_json, json_option, quiet_option, verdict_text
+from pentapod.cli.output import advice_text, cores_option, echo_json, json_option, quiet_option, verdict_text
 from pentapod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
                    "1 when left out, but 0 if the error already says which unit the part must have.")  # fmt: skip
 @click.option("--placement", type=click.Path(path_type=Path), metavar="FILE",
               help="Fix the part where `pentapod register` found it; writes placed-job.toml, too.")  # fmt: skip
+@cores_option
 @json_option
 @quiet_option
 def plan(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from pentapod.cli.output import echo_json, json_option, note_changes, quiet_option, verdict_text
+from pentapod.cli.output import cores_option, echo_json, json_option, note_changes, quiet_option, verdict_text
 from pentapod.cli.progress import progress_bar
 
 
@@ -14,6 +14,7 @@ from pentapod.cli.progress import progress_bar
 @click.argument("program", type=click.Path(path_type=Path))
 @click.option("--job", required=True, type=click.Path(path_type=Path), help="The job of the program.")
 @click.option("--strict", is_flag=True, help="List also the claims that do not apply, with the reason.")
+@cores_option
 @json_option
 @quiet_option
 def verify(program: Path, job: Path, strict: bool, as_json: bool, quiet: bool) -> int:

@@ -39,11 +39,15 @@ def first_grid(piece: PieceLike, limits: Limits, options: GridOptions = DEFAULTS
     tolerance, and until a stage gains so little speed that one path acceleration suits both of its ends.
     """
     s = _base_grid(piece, limits, options)
+    coarse = np.ones(len(s) - 1, dtype=bool)
     for _ in range(options.halvings):
-        coarse = np.concatenate([_coarse(piece, limits, s[part], options) for part in parts(len(s) - 1)])
+        new = np.flatnonzero(coarse)  # the others have been looked at
+        stages = [new[part] for part in blocks(len(new), STAGES_AT_ONCE)]
+        coarse[new] = np.concatenate([_coarse(piece, limits, s[part], s[part + 1], options) for part in stages])
         if not coarse.any():
             break
         s = np.sort(np.concatenate([s, (s[:-1] + s[1:])[coarse] / 2.0]))
+        coarse = np.repeat(coarse, 1 + coarse)
     return s
 
 
@@ -88,20 +92,19 @@ def _ramp_ends(piece: PieceLike, limits: Limits) -> Floats:
     return np.where(after > before, up, down)
 
 
-def _coarse(piece: PieceLike, limits: Limits, s: Floats, options: GridOptions) -> Bools:
-    """Return which stages (N,) are too long, by what the constraints' coefficients do at their middle."""
-    points = np.empty(2 * len(s) - 1)
-    points[0::2], points[1::2] = s, (s[:-1] + s[1:]) / 2.0
+def _coarse(piece: PieceLike, limits: Limits, begin: Floats, end: Floats, options: GridOptions) -> Bools:
+    """Return which stages (N,), in their order, are too long, by what the constraints do at their middle."""
+    points = np.column_stack([begin, (begin + end) / 2.0, end]).ravel()
     path = PathDerivatives(piece, points)
     rows, ceiling = limits.rows(path), limits.ceiling(path)
     first, second, offset = rows.first, rows.second, rows.offset
     with np.errstate(divide="ignore"):
         pushes = ((1.0 + np.abs(second) * ceiling[:, None] + np.abs(offset)) / np.abs(first)).min(axis=1)
-    a, m, b = slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2)
+    a, m, b = slice(0, None, 3), slice(1, None, 3), slice(2, None, 3)
     x = np.maximum(np.maximum(ceiling[a], ceiling[b]), ceiling[m])[:, None]
     # No stage can gain more than the whole of x over its length.
-    u = np.minimum(np.maximum(np.maximum(pushes[a], pushes[b]), pushes[m]), x[:, 0] / (2.0 * np.diff(s)))[:, None]
-    gain = np.minimum(2.0 * u * np.diff(s)[:, None], x)
+    u = np.minimum(np.maximum(np.maximum(pushes[a], pushes[b]), pushes[m]), x[:, 0] / (2.0 * (end - begin)))[:, None]
+    gain = np.minimum(2.0 * u * (end - begin)[:, None], x)
     bulge = (
         np.abs(first[m] - (first[a] + first[b]) / 2.0) * u
         + np.abs(second[m] - (second[a] + second[b]) / 2.0) * x
