@@ -238,7 +238,10 @@ class GCodeReader(StatementReader):
         """Add the dwell of a G4 block."""
         times = [word for letter, word in words.items() if letter in self.dialect.dwell]
         others = [letter for letter in words if letter not in self.dialect.dwell and letter != "N"]
-        if len(times) != 1 or others or times[0].value < 0.0:
+        if len(times) == 1 and others:
+            what, remedy = "a dwell and other words in one block", "put them into a block of their own"
+            raise self.wrong(what, line, str(words[others[0]]), remedy=remedy)
+        if len(times) != 1 or times[0].value < 0.0:
             expected = " or ".join(f"G4 {letter}…" for letter in self.dialect.dwell)
             raise self.wrong("a dwell without its time", line, "G4", expected=expected)
         value = times[0].value

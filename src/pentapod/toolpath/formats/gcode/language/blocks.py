@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from pentapod.base.errors import ToolpathError
+from pentapod.toolpath.formats.gcode.language.vocabulary import POLAR
 
 _WORD = re.compile(r"\s*([A-Z])\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
 _NAME = r"#([0-9]+|<[A-Z0-9_ ]+>)"
@@ -103,8 +104,14 @@ def ascii_only(text: str, line: int, wrong: Wrong) -> str:
 
 
 def _no_word(text: str, line: int, wrong: Wrong) -> ToolpathError:
-    if "#" in text or "[" in text:
-        what = "a variable or an expression: its value is known to the controller only"
+    if text.startswith(("@", "^")):
+        what, remedy = POLAR
+        return wrong(what, line, text, remedy=remedy)
+    if "[" in text:
+        what = "an expression with a variable" if "#" in text else "an expression"
+        return wrong(f"{what}: expressions are not computed", line, text, remedy="export numbers")
+    if "#" in text:
+        what = "a variable: its value is known to the controller only"
         return wrong(what, line, text, remedy="export numbers")
     if text.startswith(","):
         what = "a corner that the controller rounds or cuts off"

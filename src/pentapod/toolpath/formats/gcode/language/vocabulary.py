@@ -12,7 +12,7 @@ _SPINDLE = ("the feed follows the turn of the spindle, which this machine does n
 _PROBE = ("the move ends where a probe touches", "take probing out of the file")
 _SPLINE = ("a spline that the controller interpolates", "export lines and arcs")
 _SCALED = ("scaling or mirroring by the controller", "export it applied")
-_POLAR = ("polar coordinates", "export X and Y")
+POLAR = ("polar coordinates", "export X and Y")
 _PROGRAM = ("the path is in another program", "export without subprograms and macros")
 _CYCLE = ("a cycle that is not read", "export it as moves")
 
@@ -23,7 +23,7 @@ REFUSED_G: dict[float, tuple[str, str]] = {
     7.0: ("X is a diameter, or an axis that does not exist", "export a milling program"),
     **dict.fromkeys((5.0, 5.1, 5.2, 5.3, 6.0, 6.1, 6.2, 6.3), _SPLINE),
     **dict.fromkeys((50.1, 51.0, 51.1), _SCALED),
-    **dict.fromkeys((12.1, 16.0, 110.0, 111.0, 112.0), _POLAR),
+    **dict.fromkeys((12.1, 16.0, 110.0, 111.0, 112.0), POLAR),
     **dict.fromkeys((65.0, 66.0, 66.1, 68.3, 68.4), _PROGRAM),
     **dict.fromkeys((12.0, 13.0, 34.1, 72.0, 75.0, 77.0, 78.0, 87.0, 88.0), _CYCLE),
     96.0: ("the spindle's speed follows the distance from its axis: turning", "export a milling program"),
@@ -55,7 +55,7 @@ IDLE_M = frozenset({10.0, 11.0, 12.0, 13.0, 48.0, 49.0, 50.0, 51.0, 52.0, 53.0})
 REFUSED_NAMES: dict[str, tuple[str, str]] = {
     **dict.fromkeys(("CIP", "CT", "ASPLINE", "BSPLINE", "CSPLINE", "POLY"), _SPLINE),
     **dict.fromkeys(("MIRROR", "AMIRROR", "SCALE", "ASCALE"), _SCALED),
-    **dict.fromkeys(("AP", "RP"), _POLAR),
+    **dict.fromkeys(("AP", "RP"), POLAR),
     **dict.fromkeys(("CUT3DC", "CUT3DF", "CUT3DFS", "CUT3DCC"), _COMPENSATION),
     **dict.fromkeys(("TRANSMIT", "TRACYL"), ("a transformation for turned surfaces", "export with TRAORI")),
     **dict.fromkeys(("A2", "B2", "C2"), ("tool axes by Euler angles", "export rotary axes, or A3, B3, C3")),
