@@ -39,8 +39,8 @@ CONCAVE = {
     "pocket_boss": "A pocket with a square boss in it.",
     "crossing_slots": "Two slots of 8 mm that cross, one deeper than the other.",
     "ribs": "Three ribs. The ball enters one of the gaps, of 10 mm, but not the other, of 5 mm.",
-    "ring_groove": "A groove around a post, half a circle of 4 mm in section.",
-    "egg_crate": "Waves both ways; in the lows the smallest radius of curvature is 2.5 mm.",
+    "stairs": "Five steps, 8 mm wide and 4 mm high.",
+    "drafted_pocket": "A round pocket with walls of 75° and a round post with the same draft in its middle.",
 }
 MOST_LEFT = 0.5e-3
 """From this height on what is left is red, metres."""
@@ -55,6 +55,7 @@ Every strategy at work: each picture is the toolpath of a job in `toolpaths/`, a
 as it stands (`pentapod plan toolpaths/NAME.toml -o out/`). Cuts run from blue to yellow in the order of work; links and
 rapids are thin and grey. `python toolpaths/make_gallery.py` draws this page.
 The notebook `examples/gallery.ipynb` goes from a mesh to a checked program, with pictures after every step.
+A sweep of the first of these jobs over tool length and tilt has [a page of its own](sweep.md).
 """
 
 CONCAVE_HEAD = """---
@@ -92,7 +93,7 @@ def before_and_after(name: str, file: Path) -> str:
     corners = 1e3 * patch.vertices[patch.faces] @ view.T
     order = np.argsort(corners[..., 2].mean(axis=1), kind="stable")
     shade = np.clip(0.35 + 0.6 * np.abs(patch.facet_normals @ (LIGHT / np.linalg.norm(LIGHT))), 0.0, 1.0)
-    figure, pair = plt.subplots(1, 2, figsize=(8.4, 3.4), dpi=80)
+    figure, pair = plt.subplots(1, 2, sharex=True, sharey=True, figsize=(11.0, 4.4), dpi=100)
     shares: list[float] = []
     for axes, toolpath in zip(pair, (dropped, make_toolpath(mesh, BALL, options)), strict=True):
         cuts = [s.tips + BALL.radius * s.axes for s in toolpath.segments if s.kind is SegmentKind.CUT]

@@ -9,6 +9,7 @@ from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools, Floats
 from pentapod.base.refusal import Refusal
+from pentapod.base.units import to_si
 from pentapod.geometry.directions import angle_between, normalised
 from pentapod.geometry.polyline import spaced
 from pentapod.job.build.region import rolls
@@ -129,7 +130,7 @@ def may_leave_walls(job: Job, cutting: Cutting | None, options: ForesightOptions
     region, coverage = cutting.coverage.region, cutting.coverage
     if region is None or not len(region.faces):
         return False
-    return region.share_steeper(coverage.up, float(np.radians(options.walls_deg))) > coverage.share
+    return region.share_steeper(coverage.up, to_si(options.walls_deg, "deg")) > coverage.share
 
 
 def _askew(job: Job, options: ForesightOptions) -> str:
