@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from trimesh.proximity import closest_point
 
+from pentapod.cli.main import run as command
 from pentapod.job import Job, run
 from pentapod.job.build.values import job_mesh
 from pentapod.toolpath import Toolpath
@@ -32,7 +33,11 @@ PARTS = {  # mesh, [part], stepover of a ball of 6 mm in mm
     ),
 }
 CLAIM = "surface left on the region"
-QUICK = {"the top of a torus"}
+QUICK = {"the top of a torus", "wavy_mesh_with_hole.ply"}
+BY_DEFAULT = (
+    FACADE, TORUS, "wavy_mesh_with_hole.ply", "fandisk.obj", "unit_sphere.STL", "1002_tray_bottom.STL",
+    "octagonal_pocket.stl", "teapot.stl", "busted.STL", "wavy_vase_open_low_res.stl",
+)  # fmt: skip
 
 
 @pytest.fixture
@@ -60,6 +65,19 @@ def test_parts_by_others(name, planned):
     outcome = planned(*PARTS[name])
     assert outcome.passed, outcome.refusal or [c for c in outcome.verdict.certificates if not c.passed]
     assert left_on(outcome).bound == 0.1
+
+
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in BY_DEFAULT])
+def test_parts_by_others_are_planned_as_new_proposes(name, tmp_path, parts):
+    job = tmp_path / "job.toml"
+    assert command(["new", str(parts / name), "-o", str(job), "--quiet"]) == 0
+    outcome = run(Job.load(job), tmp_path / "out", advice=None)
+    assert outcome.passed, outcome.refusal or [c for c in outcome.verdict.certificates if not c.passed]
+
+
+def test_a_soup_of_facets_is_no_part(tmp_path, parts, capsys):
+    assert command(["new", str(parts / "soup.stl"), "-o", str(tmp_path / "job.toml")]) == 2
+    assert "do not join" in capsys.readouterr().err
 
 
 @pytest.mark.slow
