@@ -51,6 +51,7 @@ lint: $(READY) page-check
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
+	$(BIN)/pyright --project benchmarks
 
 page:  ## the script of the report, from its sources; needs npm
 	cd $(WEB) && npm ci --ignore-scripts --no-fund --no-audit && npm run build

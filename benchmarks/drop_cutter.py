@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import platform
 import time
+from typing import Any
 
 import numpy as np
 
@@ -21,9 +22,9 @@ from pentapod.toolpath import Mesh
 RADIUS, WIDTH = 3e-3, 0.1
 
 
-def jittered_sheet(cells: int) -> Mesh:
-    """Return a sheet of 2 · cells² facets, 100 mm wide, with waves 4 mm high and others of 0.5 mm."""
-    step = WIDTH / cells
+def jittered_sheet(cells: int, width: float = WIDTH) -> Mesh:
+    """Return a sheet of 2 · cells² facets, `width` metres wide, with waves 4 mm high and others of 0.5 mm."""
+    step = width / cells
     x, y = np.meshgrid(step * np.arange(cells + 1), step * np.arange(cells + 1), indexing="ij")
     moved = np.random.default_rng(0).uniform(-0.25, 0.25, (2, cells + 1, cells + 1)) * step
     moved[:, [0, -1]] = moved[:, :, [0, -1]] = 0.0
@@ -37,8 +38,9 @@ def jittered_sheet(cells: int) -> Mesh:
 
 def peer(mesh: Mesh, places: Floats, bucket: int) -> tuple[Floats, float]:
     """Return OpenCAMLib's heights of the centre in metres, and its seconds for them."""
-    import opencamlib as ocl  # noqa: PLC0415
+    import opencamlib  # noqa: PLC0415
 
+    ocl: Any = opencamlib  # it has no types
     surface = ocl.STLSurf()
     for corners in 1e3 * mesh.vertices[mesh.faces]:
         surface.addTriangle(ocl.Triangle(*(ocl.Point(*corner) for corner in corners)))

@@ -61,15 +61,16 @@ def ours(mesh: Mesh, places: Floats, *, between: bool) -> tuple[int, float]:
     tool = BallCutter(RADIUS)
     tips = tool.tips(contacts, normals, normals)
     met = (sweep if between else touch)(FacetTree.of(mesh), tool, tips, normals, threshold=10e-6)
-    return int(met.beyond(10e-6).sum()), float(met.deepest.max())
+    return int((met.deepest > 10e-6).sum()), float(met.deepest.max())
 
 
 def drop_cutter(mesh: Mesh, places: Floats) -> float:
     """Return OpenCAMLib's seconds for the places; nan where it is not installed."""
     try:
-        import opencamlib as ocl  # noqa: PLC0415
+        import opencamlib  # noqa: PLC0415
     except ImportError:
         return float("nan")
+    ocl: Any = opencamlib  # it has no types
     surface = ocl.STLSurf()
     for corners in 1e3 * mesh.vertices[mesh.faces]:
         surface.addTriangle(ocl.Triangle(*(ocl.Point(*corner) for corner in corners)))

@@ -157,7 +157,8 @@ def _meet_anew(it: Mutant, tests: Sequence[tuple[pytest.Item, float]], out: Bina
 
     importlib.machinery.SourceFileLoader.get_code = get_code
     hurry(20.0)
-    importlib.import_module("replay_cases").good_case = good_case
+    cases: Any = importlib.import_module("replay_cases")
+    cases.good_case = good_case
     return int(pytest.main([*_OPTIONS, *{str(item.path) for item, _ in tests}], plugins=[Chosen()]))
 
 
@@ -174,7 +175,7 @@ class Run:
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """Run all mutants."""
         session.config._tmp_path_factory.getbasetemp()  # pyright: ignore[reportAttributeAccessIssue]
-        cases = sys.modules["replay_cases"]
+        cases: Any = sys.modules["replay_cases"]
         cases.good_case = functools.cache(cases.good_case)
         start = time.perf_counter()
         for item, following in zip(session.items, [*session.items[1:], None], strict=True):

@@ -4,8 +4,8 @@
 
 Each job runs in a process of its own, so that its peak memory is its own; the two versions take turns, so that a
 machine whose speed drifts is fair to both. REVISION is a tag, branch or commit of git: the newest tag when left out;
-where there is none, this version is measured alone. The table of the kinematics, with the Newton solver as its rival,
-follows.
+where there is none, this version is measured alone. Times of commands, asked and reached, follow, and the table of the
+kinematics, with the Newton solver as its rival.
 """
 
 # ruff: noqa: PLC0415 - the parent process stays light, so that a child's memory is its own
@@ -24,9 +24,10 @@ import sys
 import tempfile
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.append(str(ROOT / "tests"))
 DEMO = ROOT / "toolpaths" / "dome.toml"
 WAYPOINTS = 50_000
 SHIPPED = ("seam", "text", "dome", "wavy")
@@ -143,6 +144,58 @@ def compare(folder: Path, against: str | None, pairs: int) -> None:
             subprocess.run([*git, "worktree", "remove", "--force", str(folder / "before")], check=True)
 
 
+class Used(NamedTuple):
+    """What a command took, in seconds: of the processor, and on the clock."""
+
+    cpu: float
+    wall: float
+
+
+def command(*arguments: str, on: int, runs: int) -> Used:
+    """Return what `pentapod` takes with some arguments on a number of cores: the least of a few runs."""
+    import time
+
+    own = {**os.environ, "PYTHONPATH": str(ROOT / "src"), "PENTAPOD_CORES": str(on)}
+    taken: list[Used] = []
+    for _ in range(runs):
+        before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+        subprocess.run([sys.executable, "-m", "pentapod", *arguments], check=True, capture_output=True, env=own)
+        after, seconds = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter() - start
+        taken.append(Used(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, seconds))
+    return Used(*map(min, zip(*taken, strict=True)))
+
+
+def small_job(folder: Path) -> Path:
+    """Write a job of a few passes at a given placement, so that little but the floor of any job is left."""
+    from pentapod.cli.commands.new import dome_stl
+    from usual_job import job_text
+
+    (folder / "part.stl").write_bytes(dome_stl(size_mm=24.0, height_mm=2.0, cells=6))
+    (folder / "small.toml").write_text(job_text(), encoding="utf-8")
+    return folder / "small.toml"
+
+
+def asked_and_reached(folder: Path, runs: int) -> None:
+    """Print what commands take, beside what was asked for on a machine of two cores."""
+    planned = {
+        name: {cores: command("plan", str(job), "-o", str(folder / "asked"), on=cores, runs=runs) for cores in (1, 2)}
+        for name, job in {"demo": DEMO, "text": DEMO.with_name("text.toml"), "small": small_job(folder)}.items()
+    }
+    told = command("--help", on=1, runs=max(runs, 10))
+    one, two = planned["demo"][1], planned["demo"][2]
+    lines = (
+        ("demo, one core: processor", "8 s", f"{one.cpu:.2f} s"),
+        ("demo, two cores: clock", "5.5 s", f"{two.wall:.2f} s"),
+        ("demo: one core against two, clock", "1.6", f"{one.wall / two.wall:.2f}"),
+        ("text, one core: processor", "5 s", f"{planned['text'][1].cpu:.2f} s"),
+        ("a small job, one core: processor", "3 s", f"{planned['small'][1].cpu:.2f} s"),
+        ("--help: clock", "0.1 s", f"{told.wall:.3f} s"),
+    )
+    print(f"\n{'commands, least of ' + str(runs) + ' runs':<40} {'asked':>8} {'reached':>9}")
+    for what, asked, reached in lines:
+        print(f"{what:<40} {asked:>8} {reached:>9}")
+
+
 def main() -> None:
     """Print all tables."""
     if sys.argv[1:2] == ["--measure"]:
@@ -154,8 +207,11 @@ def main() -> None:
     given = parser.parse_args()
     packages = ", ".join(f"{name} {version(name)}" for name in ("pentapod", "numpy", "scipy", "casadi", "toppra"))
     print(f"Python {platform.python_version()}, {platform.machine()}, {packages}; against {given.against or 'nothing'}")
+    if given.against is None:
+        print("there is no release yet; --against REVISION compares with a version before")
     with tempfile.TemporaryDirectory() as name:
         compare(Path(name), given.against, given.pairs)
+        asked_and_reached(Path(name), given.pairs)
     print()
     import kinematics  # the script beside this one
 

@@ -1,8 +1,8 @@
 """Rasters: seconds against trimesh's bare `mesh_multiplane` on the same planes, and how they grow with the facets.
 
-Run ``make bench-gouge``. The surface is one wavy sheet, 300 mm wide, in more and more facets. Seconds are those of the
-processor, one thread; the lines are drawn (cut, joined, with normals), and finished (waypoints within the tolerance, in
-order, with links that are proven clear).
+Run ``make bench-gouge``. The surface is one wavy sheet, 300 mm wide, in more and more irregular facets. Seconds are
+those of the processor, one thread; the lines are drawn (cut, joined, with normals), and finished (waypoints within the
+tolerance, in order, with links that are proven clear).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
+from drop_cutter import jittered_sheet
 
 from pentapod.mesh.query.swept_depth import touch
 from pentapod.mesh.query.tree import FacetTree
@@ -24,19 +25,6 @@ from pentapod.toolpath.surfaces.part_surface import PartSurface
 WIDTH, STEPOVER = 0.3, 1.5e-3
 TOOL = BallCutter(3e-3)
 Value = TypeVar("Value")
-
-
-def wavy_sheet(cells: int) -> Mesh:
-    """Return a sheet of 2 · cells² facets, waves 4 mm high and 50 mm long."""
-    line = np.linspace(-0.5 * WIDTH, 0.5 * WIDTH, cells + 1)
-    x, y = np.meshgrid(line, line)
-    z = 4e-3 * np.sin(x / 8e-3) * np.cos(y / 9e-3)
-    n = cells + 1
-    first = np.arange(cells * n).reshape(cells, n)[:, :-1].ravel()
-    faces = np.concatenate(
-        [np.stack([first, first + 1, first + n + 1], 1), np.stack([first, first + n + 1, first + n], 1)]
-    )
-    return Mesh.of(np.stack([x, y, z], -1).reshape(-1, 3), faces)
 
 
 def timed(action: Callable[[], Value]) -> tuple[Value, float]:
@@ -63,13 +51,13 @@ def main() -> None:
     parser.add_argument("--finish-up-to", type=int, default=1_000_000)
     options = parser.parse_args()
     told = RasterOptions(stepover=STEPOVER, spacing=2e-3, chordal=10e-6)
-    raster_paths(PartSurface(wavy_sheet(10), TOOL, told.up), told)
-    touch(FacetTree.of(wavy_sheet(10)), TOOL, np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
+    raster_paths(PartSurface(jittered_sheet(10, WIDTH), TOOL, told.up), told)
+    touch(FacetTree.of(jittered_sheet(10, WIDTH)), TOOL, np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
     print(f"NumPy {np.__version__}, Python {platform.python_version()}, {platform.machine()}, one thread")
     columns = ("facets", "mesh s", "planes s", "lines s", "ratio", "finished s", "tree s", "lines / n log n")
     print("  ".join(f"{name:>15}" for name in columns))
     for facets in options.facets:
-        mesh, loading = timed(lambda count=facets: wavy_sheet(round((count / 2) ** 0.5)))
+        mesh, loading = timed(lambda count=facets: jittered_sheet(round((count / 2) ** 0.5), WIDTH))
         _ = mesh.corner_normals
         planes = planes_of(mesh)
         lines = timed(lambda part=mesh: raster_paths(PartSurface(part, TOOL, told.up), told))[1]

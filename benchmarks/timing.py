@@ -14,6 +14,7 @@ import resource
 import time
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -21,7 +22,7 @@ from timing_peers import copp_robot, highs, our_chain, socp, toppra_chain
 from timing_robots import drake_solver, ruckig_line
 
 from pentapod.timing.jerk.interval import Interval
-from pentapod.timing.jerk.jerk_limited import JerkProblem, jerk_limited
+from pentapod.timing.jerk.jerk_limited import JerkProblem, JerkProfile, jerk_limited
 from pentapod.timing.jerk.knots import place_knots
 from pentapod.timing.jerk.options import DEFAULTS, JerkOptions
 from pentapod.timing.jerk.rows import JerkRows
@@ -108,7 +109,7 @@ class Problem:
         return float((2.0 * np.diff(self.s) / (root[1:] + root[:-1])).sum())
 
 
-def best(work: Callable[[], object], runs: int = 5) -> tuple[float, object]:
+def best(work: Callable[[], Any], runs: int = 5) -> tuple[float, Any]:
     """Return the least processor time of a few runs, in seconds, and the last result."""
     times, result = [], None
     for _ in range(runs):
@@ -161,6 +162,14 @@ def one_pass(p: Problem, x: np.ndarray) -> tuple[Subproblem, float, float]:
     return problem, first, later
 
 
+def jerk_law(problem: JerkProblem) -> JerkProfile:
+    """Return the jerk-limited profile of a problem that has one."""
+    profile = jerk_limited(problem)
+    if isinstance(profile, Failure):
+        raise SystemExit(str(profile))
+    return profile
+
+
 def jerk(n: int) -> None:
     """Jerk limits: time a pass and the whole law, and how near few passes come to what they settle at."""
     for kind in ("raster", "sine"):
@@ -170,7 +179,7 @@ def jerk(n: int) -> None:
         count, durations, used = len(problem.s), [], 0.0
         for passes in (1, 2, DEFAULTS.passes):
             used, profile = best(
-                lambda k=passes, p=p, x=x: jerk_limited(JerkProblem(p.s, x, p.jerk_rows, NO_KINKS, JerkOptions(k))), 2
+                lambda k=passes, p=p, x=x: jerk_law(JerkProblem(p.s, x, p.jerk_rows, NO_KINKS, JerkOptions(k))), 2
             )
             durations.append(profile.nodes.law().duration)
         print(
@@ -196,7 +205,7 @@ def jerk_peers(n: int) -> None:
         if peer := copp_robot(p.s, p.q, (VELOCITY, ACCELERATION, JERK), p.feed):
             solves, durations = socp(peer, x, p.s, 6)
             used, _ = best(solves[0], 1)
-            profile = jerk_limited(JerkProblem(p.s, x, p.jerk_rows, NO_KINKS))
+            profile = jerk_law(JerkProblem(p.s, x, p.jerk_rows, NO_KINKS))
             ours = profile.nodes.law().duration
             line += f"; TOPP3-SOCP {1e6 * used / len(p.s):.0f} µs: {used / len(p.s) / (first / count):.0f} times; "
             line += f"durations {ours:.4f} s, SOCP's " + ", ".join(f"{d:.4f}" for d in durations)
@@ -267,7 +276,7 @@ def line(n: int) -> None:
         jerks = np.stack([0.0 * q1, 0.0 * q1, 0.5 * q1], axis=-1) / JERK
         return JerkRows(q1 / ACCELERATION, 0.0 * q1, np.zeros((1, 5)), jerks, np.full(len(s), bound[0]))
 
-    ours, profile = best(lambda: jerk_limited(JerkProblem(s, x, rows, NO_KINKS)), 3)
+    ours, profile = best(lambda: jerk_law(JerkProblem(s, x, rows, NO_KINKS)), 3)
     seconds = profile.nodes.law().duration
     print(
         f"line    {len(profile.nodes.s):8d} gridpoints with jerk limits, from rest to rest: {seconds:.5f} s in "
@@ -282,7 +291,7 @@ def million(n: int) -> None:
     x = p.solved("core")
     s, base = p.s, p.s[-1]
     start, wall = time.process_time(), time.perf_counter()
-    profile = jerk_limited(s, x, p.jerk_rows, NO_KINKS)
+    profile = jerk_law(JerkProblem(s, x, p.jerk_rows, NO_KINKS))
     profile.nodes.law()
     count = len(profile.nodes.s)
     used = time.process_time() - start

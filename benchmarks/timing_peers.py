@@ -6,6 +6,7 @@ import logging
 import warnings
 from collections.abc import Callable
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
@@ -69,10 +70,12 @@ def highs(problem: Subproblem) -> Callable[[], object]:
     at = np.repeat(np.arange(count), 4)
 
     def by_y(a0, a1, a2) -> csr_array:
-        values = sum(a[:, None] * problem.basis[:, d] for d, a in enumerate((a0, a1, a2)))
+        values = np.sum([a[:, None] * problem.basis[:, d] for d, a in enumerate((a0, a1, a2))], axis=0)
         return csr_array((values.ravel(), (at, columns)), shape=(count, n))
 
-    blocks, bounds, zero = [], [], np.zeros(count)
+    blocks: list[csr_array] = []
+    bounds: list[float] = []
+    zero = np.zeros(count)
     for j in range(rows.first.shape[1]):
         row = by_y(rows.second[:, j], 0.5 * rows.first[:, j], zero)
         blocks, bounds = [*blocks, row, -row], [*bounds, 1.0, 1.0]
@@ -114,7 +117,7 @@ def toppra_chain(s: np.ndarray, legs: np.ndarray, velocity: float, acceleration:
         instance = algorithm.TOPPRA(
             [rates, pushes], path, gridpoints=s, solver_wrapper="seidel", parametrizer="ParametrizeConstAccel"
         )
-        motion = instance.compute_trajectory(0.0, 0.0)
+        motion: Any = instance.compute_trajectory(0.0, 0.0)
         return motion(np.arange(0.0, motion.duration, period))
 
     return chain

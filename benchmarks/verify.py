@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,7 @@ from pentapod.verify import Cutting, verify
 BALL, FEED, RAMP = 3e-3, 0.025, 0.5
 
 
-def timed(work: Callable[[], object]) -> tuple[float, object]:
+def timed(work: Callable[[], Any]) -> tuple[float, Any]:
     """Return CPU seconds and what the work gave."""
     start = time.process_time()
     value = work()

@@ -11,14 +11,12 @@ from pathlib import Path
 import psutil
 import stub_tasks
 
-from pentapod.batch import Engine, EngineOptions
-
-OPTIONS = EngineOptions(tries=6, alone=6)
+from pentapod.batch import Engine
 
 
 def rows_of(made, out, workers):
     """Run tasks and return their rows by name."""
-    with Engine(out, workers=workers, options=OPTIONS) as engine:
+    with Engine(out, workers=workers) as engine:
         return {done.task.name: done.columns for done in engine.run(made)}
 
 

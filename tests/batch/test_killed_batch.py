@@ -52,9 +52,11 @@ def test_jobs_on_workers_give_the_table_of_a_serial_run(make_job, tmp_path):
     path = make_job(("spacing_mm = 4", "spacing_mm = 8"))
     jobs = [Job.load(path).with_(feed={"cut_mm_min": feed}) for feed in (2000, 2500, 3000)]
     jobs.append(jobs[0].with_(tool={"length_mm": 90}))  # the spindle would end above a platform joint
-    running = batch(jobs, tmp_path / "runs", workers=2)
-    assert len(running) == 4
-    assert sorted(done.status for done in running) == ["invalid", "passed", "passed", "passed"]
+    running = batch([*jobs, jobs[0]], tmp_path / "runs", workers=2)
+    assert len(running) == 5
+    found = list(running)
+    assert sorted(done.status for done in found) == ["invalid", *["passed"] * 4]
+    assert sum(done.new for done in found) == 4  # what is given twice is planned once
     store, rows = Store(tmp_path / "serial"), []
     for job in jobs:
         task = job_task(job, store)

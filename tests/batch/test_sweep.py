@@ -94,6 +94,8 @@ def test_a_combination_that_makes_no_job_is_told_before_any_is_run(text, said, s
     with pytest.raises(InputError) as caught:
         sweep(text).tasks(Store(tmp_path / "runs"))
     assert re.search(said, str(caught.value)), str(caught.value)
+    assert run(["sweep", str(tmp_path / "sweep.toml"), "-o", str(tmp_path / "out")]) == 2
+    assert not (tmp_path / "out").exists()
 
 
 def test_tasks_of_a_sweep_have_all_that_their_jobs_name(sweep, tmp_path):
@@ -137,6 +139,8 @@ def test_a_row_tells_what_became_of_a_job(make_job, tmp_path):
     row = plan_in(folder, "job.toml")
     verdict = json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
     assert row["status"] == "passed"
+    assert 'href="sheet.html"' in (folder / "report.html").read_text(encoding="utf-8")
+    assert (folder / "sheet.html").is_file()
     assert row["program_sha256"] == verdict["sha256"]["program"]
     assert row["margin"] == row["margins"][row["margin_limit"]] == min(row["margins"].values()) > 0
     assert row["cycle_time_s"] > 1

@@ -15,7 +15,7 @@ from pentapod.base.errors import InputError, PentapodError
 from pentapod.batch import Engine
 from pentapod.batch.tasks.engine import LOG
 from pentapod.cli.main import run
-from pentapod.design import proof_tasks
+from pentapod.design import members, proof_tasks
 from pentapod.design import search as module
 from pentapod.design.design_file import DesignFile
 from pentapod.design.evaluation import Sample, worst_poses
@@ -71,6 +71,20 @@ def test_evaluations_of_another_version_are_not_taken(design_file, tmp_path):
     changed.tofile(tmp_path / "designs.bin")
     assert search(file, tmp_path).vectors.tobytes() == expected.vectors.tobytes()
     assert (np.fromfile(tmp_path / "designs.bin", dtype="<f8") == rows).all()
+
+
+def test_a_search_of_another_version_begins_anew(design_file, tmp_path, caplog):
+    file = DesignFile.load(design_file())
+    members._check_folder(file, tmp_path)
+    (tmp_path / "designs.bin").write_bytes(b"evaluations")
+    members._check_folder(file, tmp_path)
+    assert (tmp_path / "designs.bin").exists()
+    before = json.loads((tmp_path / "search.json").read_text(encoding="utf-8"))
+    (tmp_path / "search.json").write_text(json.dumps(before | {"versions": {"pentapod": "0.0.1"}}), encoding="utf-8")
+    members._check_folder(file, tmp_path)
+    assert "it begins anew" in caplog.text
+    assert not (tmp_path / "designs.bin").exists()
+    assert json.loads((tmp_path / "search.json").read_text(encoding="utf-8")) == before
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from pentapod.base.toml import toml_text
 from pentapod.batch.changes import machine_content
 from pentapod.batch.tasks.store import Input, Store
 from pentapod.batch.tasks.task import Row, Task
-from pentapod.job.artefacts import PROGRAM, REPORT, WITHHELD
+from pentapod.job.artefacts import PROGRAM, REPORT, SHEET, WITHHELD
 from pentapod.job.schema.job import Job
 
 STATUSES = ("passed", "refused", "failed", "invalid", "crashed")
@@ -64,12 +64,13 @@ def _machine_inputs(job: Job, store: Store, machine: Mapping[str, Any] | None) -
 
 
 def plan_in(folder: Path, job: str) -> Row:
-    """Plan and verify a job in its folder, with a report, and return its row."""
+    """Plan and verify a job in its folder, with its report and set-up sheet, and return its row."""
     from pentapod.job.pipeline.run import run  # noqa: PLC0415  the driver of a batch plans nothing
     from pentapod.report import write_report  # noqa: PLC0415
+    from pentapod.report.sheet import write_sheet  # noqa: PLC0415
 
     try:
-        outcome = run(Job.load(folder / job), folder, writers={REPORT: write_report}, advice=None)
+        outcome = run(Job.load(folder / job), folder, writers={REPORT: write_report, SHEET: write_sheet}, advice=None)
     except InputError as error:
         place = {name: getattr(error, name) for name in ("key", "value", "expected", "remedy")}
         return {"status": "invalid", "cause": str(InputError(error.what, **place))}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,10 +19,9 @@ from pentapod.base.errors import InputError
 from pentapod.base.files import atomic_write
 from pentapod.base.progress import Progress, silent
 from pentapod.base.values import Value
-from pentapod.base.version import __version__
 from pentapod.batch.jobs import job_task
 from pentapod.batch.tasks.engine import Engine
-from pentapod.batch.tasks.task import Row, Task
+from pentapod.batch.tasks.task import Row, Task, versions
 from pentapod.design.design_file import DesignFile, Need
 from pentapod.design.evaluation import Sample
 from pentapod.design.figures import in_poses
@@ -30,10 +30,12 @@ from pentapod.design.machine_text import machine_text, outward
 from pentapod.design.proof import Proof, worst_of
 from pentapod.design.proof_tasks import proof_of, proof_task
 from pentapod.design.quantities import QUANTITIES, completed
-from pentapod.design.search import Found, search, undominated
+from pentapod.design.search import DESIGNS, Found, search, undominated
 from pentapod.job.schema.job import Job
 from pentapod.machine.machine import Machine, read_machine
 from pentapod.machine.report.report import check
+
+_log = logging.getLogger("pentapod")
 
 MACHINE = "machine.toml"
 """Name of a member's machine file."""
@@ -111,13 +113,17 @@ def _check_folder(file: DesignFile, folder: Path) -> None:
     asked = json.dumps([file.text, file.machine.digest, [job.digest for job in file.jobs]])
     digest, place = hashlib.sha256(asked.encode()).hexdigest(), folder / "search.json"
     if place.exists():
-        if json.loads(place.read_text(encoding="utf-8"))["digest"] != digest:
+        before = json.loads(place.read_text(encoding="utf-8"))
+        if before["digest"] != digest:
             raise InputError(
                 "the folder holds another search", file=folder, remedy="name another folder, or empty this one"
             )
-        return
+        if before.get("versions") == versions():
+            return
+        _log.warning("the folder holds the search of another version of pentapod, or of a library: it begins anew")
+        (folder / DESIGNS).unlink(missing_ok=True)
     with atomic_write(place) as temporary:
-        temporary.write_text(json.dumps({"digest": digest, "pentapod": __version__}), encoding="utf-8")
+        temporary.write_text(json.dumps({"digest": digest, "versions": versions()}), encoding="utf-8")
 
 
 def _proven(file: DesignFile, found: Found, engine: Engine, progress: Progress) -> list[Member]:

@@ -21,6 +21,8 @@ from pentapod.design.evaluation import FAR, Sample, evaluated, first_sample, sho
 from pentapod.design.part_poses import PartPoses
 from pentapod.design.quantities import QUANTITIES
 
+DESIGNS = "designs.bin"
+"""The file of evaluations, within the folder of a search."""
 SPREADS = (0.02, 0.05, 0.15)
 """The first designs are around the start, by these shares of the ranges (standard deviations)."""
 WATCHED = 12
@@ -59,7 +61,7 @@ class Log:
         n, start = vectors.shape[1], self.count
         old = self._known[start : start + len(vectors)]
         same = np.array_equal(old[:, :n], vectors[: len(old)])
-        if not same:  # of another version of pentapod, or of numpy
+        if not same:  # of another machine, whose last bits differ
             with self._path.open("r+b") as file:
                 file.truncate(start * self._width * 8)
             self._known, old = self._known[:start], self._known[:0]
@@ -85,7 +87,7 @@ def search(file: DesignFile, folder: Path, progress: Progress = silent) -> Found
 
     unknowns, asked = file.unknowns, file.search
     sample = first_sample(file, PartPoses.of(file.jobs, file.part_poses))
-    log = Log(folder / "designs.bin", len(unknowns.names) + len(QUANTITIES))
+    log = Log(folder / DESIGNS, len(unknowns.names) + len(QUANTITIES))
     problem: Any = Problem(
         n_var=len(unknowns.names), n_obj=len(file.objectives), n_ieq_constr=len(file.needs), xl=unknowns.low,
         xu=unknowns.high,

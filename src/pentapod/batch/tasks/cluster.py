@@ -12,7 +12,7 @@ from pentapod.base.display import load_extra
 from pentapod.base.errors import InputError
 
 _SETTINGS = {
-    # A worker gets the next task when it has none, so that its death is nobody else's.
+    # A worker gets a task when it has none, also where two answers come at once: its death is nobody else's.
     "distributed.scheduler.worker-saturation": 1.0,
     # The engine runs a task again, and counts; the scheduler shall not.
     "distributed.scheduler.allowed-failures": 0,
@@ -40,7 +40,8 @@ def client_of(scheduler: str | None, workers: int | None) -> Generator[Any]:
         if not _ADDRESS.fullmatch(scheduler):
             raise InputError("not the address of a scheduler", expected="tcp://host:8786, for example", **place)
         try:
-            client = distributed.Client(scheduler, timeout=CONNECT_S, set_as_default=False)
+            # Folders come from the workers themselves; where these cannot be reached, through the scheduler.
+            client = distributed.Client(scheduler, timeout=CONNECT_S, set_as_default=False, direct_to_workers=True)
         except OSError as error:
             raise InputError("no scheduler answers", **place) from error
         with client:

@@ -97,6 +97,7 @@ class Engine:
         self.folder, self.store, self.options = Path(folder), Store(Path(folder)), options
         self._workers, self._scheduler = workers, scheduler
         self._open = ExitStack()
+        self._made = self._has_begun = False
         self._client: Any = None
         self._has_waited = False
         self._mark = f".unfinished-{os.getpid()}-{secrets.token_hex(4)}"
@@ -104,6 +105,7 @@ class Engine:
         self._sent: dict[tuple[str, str], float] = {}
 
     def __enter__(self) -> Self:
+        self._made = not self.folder.exists()
         alone = self._open.enter_context(locked(self.folder, make=True))
         if alone:
             remove_unfinished(self.folder)
@@ -114,6 +116,8 @@ class Engine:
 
     def __exit__(self, *failure: object) -> None:
         self._open.close()
+        if self._made and not self._has_begun:  # a mistake in a file leaves nothing behind
+            shutil.rmtree(self.folder, ignore_errors=True)
 
     def run(self, tasks: Sequence[Task]) -> Iterator[Done]:
         """Yield each task when it is done: those that were done before first, then as they end.
@@ -138,12 +142,22 @@ class Engine:
             if self._client is None:
                 count = None if self._scheduler else min(self._workers or cores(), len(missing))
                 self._client = self._open.enter_context(client_of(self._scheduler, count))
+            self._has_begun = True
             yield from _Rounds(self, missing).done()
 
     def _tidy(self) -> None:
         """Remove what is not whole of this engine."""
         for path in self.folder.glob(f".unfinished-{os.getpid()}-*"):
             shutil.rmtree(path, ignore_errors=True)
+
+    @property
+    def threads(self) -> int:
+        """Tasks that its workers can run at a time now; at least one. Raises InputError where the scheduler is gone."""
+        try:
+            return max(1, sum(self._client.nthreads().values()))
+        except OSError:
+            self.check()
+            return 1
 
     def order(self, task: Task) -> Order:
         """Return a task as workers take it."""
@@ -193,10 +207,13 @@ class Engine:
 
 
 class _Rounds:
-    """Tasks till each is done: one whose process or worker died is run again, at last alone."""
+    """Tasks till each is done: one whose process or worker died is run again, at last alone.
+
+    A scheduler gets as many as its workers have threads: one that waited at a worker would die with its neighbour.
+    """
 
     def __init__(self, engine: Engine, tasks: Sequence[Task]) -> None:
-        self._engine, self._options, self._tasks = engine, engine.options, tasks
+        self._engine, self._options, self._waiting = engine, engine.options, deque(tasks)
         self._answered: SimpleQueue[Any] = SimpleQueue()
         self._running: dict[str, tuple[Any, Task, float]] = {}
         self._alone: deque[Task] = deque()
@@ -205,10 +222,11 @@ class _Rounds:
     def done(self) -> Iterator[Done]:
         """Yield the tasks as they end."""
         try:
-            for task in self._tasks:
-                self._start(task)
-            while self._running or self._alone:
-                if not self._running:
+            while self._waiting or self._running or self._alone:
+                if self._waiting and len(self._running) < (threads := self._engine.threads):
+                    while self._waiting and len(self._running) < threads:
+                        self._start(self._waiting.popleft())
+                elif not self._running:
                     self._start(self._alone.popleft())
                 try:
                     future = self._answered.get(timeout=self._options.tick)
@@ -259,7 +277,7 @@ class _Rounds:
             engine.log(task, answer, "died")
             self._lost[task.name] += 1
             if self._lost[task.name] < self._options.tries:
-                self._start(task)
+                self._waiting.append(task)
                 return None
             if self._lost[task.name] < self._options.tries + self._options.alone:
                 self._alone.append(task)

@@ -32,8 +32,12 @@ def design(file: Path, out: Path, workers: int | None, as_json: bool, quiet: boo
     from pentapod.design.members import design_machines
     from pentapod.design.output import TABLE, folder_of, headline, to_dict, write_front
 
-    with progress_bar(quiet=quiet or as_json) as progress:
-        front = design_machines(asked, out, workers, progress)
+    try:
+        with progress_bar(quiet=quiet or as_json) as progress:
+            front = design_machines(asked, out, workers, progress)
+    except (KeyboardInterrupt, SystemExit):
+        click.echo(f"what is done is in {out}: the same command goes on from there", err=True)
+        raise
     page = write_front(front, out)
     if as_json:
         echo_json({**to_dict(front), "out": str(out)})
