@@ -50,7 +50,12 @@ class PathOptions(Value):
     ] = Entry.AXIS
     stay: Annotated[
         float | None,
-        Key("mm", "largest distance between passes for a link on the surface; 3 stepovers when left out", ge=0.0),
+        Key(
+            "mm",
+            "largest distance between passes for a link on the surface; when left out 3 stepovers, or 4 heights of "
+            "approach if that is more and the tool stands off",
+            ge=0.0,
+        ),
     ] = None
     hop: Annotated[float, Key("mm", "largest distance between passes for a hop just above the part", ge=0.0)] = 20e-3
     spacing: Annotated[float, Key("mm", "largest distance between waypoints on the surface", gt=0.0)] = 2e-3

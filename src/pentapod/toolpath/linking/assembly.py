@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
+from pentapod.cutters.stand_off import StandOff
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.runs import run_starts
@@ -26,12 +27,15 @@ from pentapod.toolpath.toolpath import Toolpath
 class AssemblyOptions:
     """reach: distance in stepovers up to which links stay on the surface, if `PathOptions.stay` is None.
 
+    reach_of_beam: the same in approach heights, of a tool that stands off from the part, where that is more: a retract
+    and an approach, with stops at their corners, take longer than the way over the surface.
     hidden_slack: height of the part above a waypoint, metres, from which it is hidden. halvings: of the step between a
     waypoint that is hidden and one that is not, to find where the pass ends. least_cosine: of the region's angle, for
     the height of the surface above lines below it.
     """
 
     reach: float = 3.0
+    reach_of_beam: float = 4.0
     hidden_slack: float = 1e-6
     halvings: int = 6
     least_cosine: float = 0.05
@@ -65,6 +69,8 @@ def assembled(
     source, passes = source[passes.levels], replace(passes, levels=levels[passes.levels])
     power = np.ones(len(passes)) if paths.power is None else paths.power[source]
     reach = assembly.reach * paths.stepover if options.stay is None else options.stay
+    if isinstance(tool, StandOff) and options.stay is None:
+        reach = max(reach, assembly.reach_of_beam * options.approach)
     # A proven link may be of any length, but not back along a pass that is cut one way.
     anywhere = surface.slides and paths.both_ways and options.stay is None
     runs: list[Run] = []
