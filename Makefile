@@ -18,7 +18,7 @@ ORACLES := pytest pytest-xdist hypothesis mpmath rtree pyyaml psutil python-flin
 LOWEST_TESTS := tests/numerics tests/geometry tests/kinematics tests/timing tests/program tests/mesh/query/test_swept_depth.py \
 	tests/toolpath/inputs/test_drawings.py tests/simulate/test_servo.py tests/job/test_pipeline.py
 
-.PHONY: demo test test-all test-lowest lock lint mutation bench bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view bench-machines bench-batch bench-design bench-control kernels reference pictures page page-check site clean
+.PHONY: demo test test-all test-lowest lock lint mutation bench bench-large bench-kinematics bench-timing bench-gouge bench-planning bench-verify bench-view bench-machines bench-batch bench-design bench-control kernels reference pictures page page-check site clean
 
 demo: $(READY)  ## plan a dome and judge the program; kernels are compiled before, on all cores
 	$(BIN)/pentapod warm-up
@@ -65,6 +65,9 @@ mutation: $(READY)  ## do the tests of the verdict notice changes of it?
 
 bench: $(READY)  ## stage times of whole jobs against the last release (AGAINST=revision), kinematics against Newton
 	$(BIN)/python benchmarks/pipeline.py $(if $(AGAINST),--against $(AGAINST))
+
+bench-large: $(READY)  ## a million waypoints, and scans of a million facets and five: seconds and memory, asked and reached
+	$(BIN)/python benchmarks/large_jobs.py
 
 bench-kinematics: $(READY)  ## kinematics and proofs against copying arrays and against Newton
 	$(BIN)/python benchmarks/kinematics.py

@@ -36,12 +36,12 @@ SHIPPED = ("seam", "text", "dome", "wavy")
 """Jobs of `toolpaths/`: a short line, letters on a dome, the demo, a free form."""
 
 
-def large_job(folder: Path) -> Path:
-    """Write the demo with finer passes and closer waypoints, about 50,000 of them, and return its path."""
+def finer_dome(folder: Path, stepover: float, spacing: float) -> Path:
+    """Write the demo with other distances between passes and waypoints, mm; return its path."""
     text = DEMO.read_text(encoding="utf-8")
     # The dome's demo has passes of 3 mm and waypoints each 2 mm at most.
-    text = re.sub(r"(?m)^stepover_mm = \S+", "stepover_mm = 1.0", text)
-    text = re.sub(r"(?m)^spacing_mm = \S+", "spacing_mm = 0.378", text)
+    text = re.sub(r"(?m)^stepover_mm = \S+", f"stepover_mm = {stepover}", text)
+    text = re.sub(r"(?m)^spacing_mm = \S+", f"spacing_mm = {spacing}", text)
     text = text.replace('"dome.stl"', json.dumps(str(DEMO.parent / "dome.stl")))
     path = folder / "large.toml"
     path.write_text(text, encoding="utf-8")
@@ -134,7 +134,7 @@ def compare(folder: Path, against: str | None, pairs: int) -> None:
         sources["before"] = folder / "before" / "src"
     try:
         jobs = {f"{name} (toolpaths/{name}.toml)": ROOT / "toolpaths" / f"{name}.toml" for name in SHIPPED}
-        jobs[f"large (the dome with about {WAYPOINTS:,} waypoints)"] = large_job(folder)
+        jobs[f"large (the dome with about {WAYPOINTS:,} waypoints)"] = finer_dome(folder, 1.0, 0.378)
         for name, job in jobs.items():
             results: dict[str, list[dict[str, Any]]] = {version: [] for version in sources}
             for number in range(pairs):

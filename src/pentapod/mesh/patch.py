@@ -17,6 +17,7 @@ from pentapod.mesh.normals import facet_cross, unit_or_zero
 from pentapod.mesh.region import Region
 from pentapod.mesh.topology import Topology
 from pentapod.mesh.trimming import Root, compacted, linear_root, normal_root, trimmed
+from pentapod.numerics.threads import nearest_points
 
 MOST_FACETS = 8_000_000
 """Facets beyond which a patch is not refined."""
@@ -222,10 +223,10 @@ def _nearer(tree: KDTree, points: Floats, bound: float) -> Bools:
         np.ravel_multi_index(tuple(cell.T), cell.max(axis=0) + 1), return_index=True, return_inverse=True
     )
     middle, spread = (np.floor(points[first] / side) + 0.5) * side, (1.0 + 1e-9) * 0.5 * np.sqrt(3.0) * side
-    away = np.asarray(tree.query(middle, distance_upper_bound=bound + spread)[0])
+    away = np.asarray(nearest_points(tree, middle, distance_upper_bound=bound + spread)[0])
     found = (away + spread < bound)[cube]
     open_ = np.flatnonzero(~found & (away < np.inf)[cube])
-    found[open_] = np.isfinite(np.asarray(tree.query(points[open_], distance_upper_bound=bound)[0]))
+    found[open_] = np.isfinite(np.asarray(nearest_points(tree, points[open_], distance_upper_bound=bound)[0]))
     return found
 
 

@@ -11,11 +11,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextvars import copy_context
 from functools import cache, wraps
-from typing import Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy.typing as npt
 
 from pentapod.numerics.blocks import blocks
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
 
 Array = npt.NDArray[Any]
 _Item = TypeVar("_Item")
@@ -109,6 +112,15 @@ def both(first: Callable[[], _Result], second: Callable[[], _Other]) -> tuple[_R
     """Return what two functions return, which work beside each other where there are cores."""
     results: list[Any] = list(in_threads(lambda each: each(), (first, second)))
     return results[0], results[1]
+
+
+MANY_POINTS = 5_000
+"""More points than these are looked up on all cores: some milliseconds of work."""
+
+
+def nearest_points(tree: KDTree, points: Array, **asked: Any) -> tuple[Any, Any]:
+    """Return `tree.query(points, **asked)`, distances and indices, found on all cores where there are many points."""
+    return tree.query(points, workers=cores() if len(points) > MANY_POINTS else 1, **asked)
 
 
 ROWS = 2048

@@ -15,6 +15,7 @@ from pentapod.geometry.polyline import spaced
 from pentapod.job.build.region import rolls
 from pentapod.job.build.toolpath import Reports
 from pentapod.job.schema.job import Job
+from pentapod.numerics.threads import nearest_points
 from pentapod.toolpath.gouge.report import GougeReport
 from pentapod.toolpath.toolpath import Toolpath
 from pentapod.verify import Cutting
@@ -42,7 +43,7 @@ def uncovered(points: Floats, path: Floats, radius: float, near: float) -> Bools
 
     near: steps along the path, radii.
     """
-    return np.asarray(KDTree(spaced(path, near * radius)).query(points)[0]) > radius
+    return np.asarray(nearest_points(KDTree(spaced(path, near * radius)), points)[0]) > radius
 
 
 def missed_by_drops(
@@ -58,7 +59,7 @@ def missed_by_drops(
     points, normals = coverage.region.spread(options.points)
     above = points + coverage.left * normals
     motions = np.concatenate([spaced(motion, options.near * radius) for motion in dropped])
-    left = np.flatnonzero(np.asarray(KDTree(motions).query(above)[0]) <= radius)
+    left = np.flatnonzero(np.asarray(nearest_points(KDTree(motions), above)[0]) <= radius)
     left = left[uncovered(above[left], toolpath.tilt_centres, radius, options.near)]
     if not len(left):
         return 0.0

@@ -25,6 +25,7 @@ from pentapod.mesh.normals import corner_angles
 from pentapod.mesh.offset.dual_contouring import Cells, Grid
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.mesh.topology import components
+from pentapod.numerics.threads import nearest_points
 
 _BEYOND = 0.01
 """How far beyond the level a place is looked at, as a share of the distance: half of the least play that is found."""
@@ -157,7 +158,7 @@ def _between_nodes(tree: FacetTree, nodes: Nodes, surface: Floats, level: float)
     own = KDTree(points)
     a, b = own.query_pairs(_LINK * level, output_type="ndarray").T
     piece = components(len(points), a, b)[1]
-    near = KDTree(surface).query(points, distance_upper_bound=_LINK * level)[0] < np.inf
+    near = nearest_points(KDTree(surface), points, distance_upper_bound=_LINK * level)[0] < np.inf
     return cells[np.isin(piece, piece[near])]
 
 

@@ -7,6 +7,7 @@ from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Floats, Ints
 from pentapod.mesh.patch import Patch
+from pentapod.numerics.threads import nearest_points
 
 FIRST_CANDIDATES = 16
 """Facets tried at first for each point; four times as many wherever they do not suffice."""
@@ -24,7 +25,7 @@ def closest(patch: Patch, points: Floats) -> tuple[Ints, Floats, Floats]:
     weights = np.zeros((len(points), 3))
     open_rows, tries = np.arange(len(points)), min(FIRST_CANDIDATES, len(centres))
     while len(open_rows):
-        to_centre, candidates = (np.reshape(a, (-1, tries)) for a in tree.query(points[open_rows], k=tries))
+        to_centre, candidates = (np.reshape(a, (-1, tries)) for a in nearest_points(tree, points[open_rows], k=tries))
         bary = _weights(patch, candidates, points[open_rows])
         found = np.einsum("nkc,nkcd->nkd", bary, patch.vertices[patch.faces[candidates]])
         distance = np.linalg.norm(found - points[open_rows, None], axis=2)

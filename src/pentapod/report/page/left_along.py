@@ -6,6 +6,7 @@ import numpy as np
 
 from pentapod.base.arrays import Bools, Floats, Ints
 from pentapod.geometry.polyline import arc_length
+from pentapod.numerics.threads import nearest_points
 from pentapod.planning import PlacedPath
 from pentapod.report.signals import Signals
 from pentapod.verify.verdict.material_left import MaterialLeft
@@ -33,13 +34,13 @@ def left_at(signals: Signals, placed: PlacedPath, rows: Ints, left: MaterialLeft
         moved = signals.tips[of] + placed.toolpath.tilt_centre * signals.axes[of]
         return placed.placement.transform.inverse().apply(moved)
 
-    heights = left.heights[KDTree(left.points).query(centres(rows))[1]]
+    heights = left.heights[nearest_points(KDTree(left.points), centres(rows))[1]]
     cuts = np.flatnonzero(signals.cutting)
     cuts = cuts[:: max(1, len(cuts) // ROWS)]
     if len(cuts):
         steps = _steps(signals)
         most = np.full(steps[-1] + 3, -np.inf)
-        np.maximum.at(most, 1 + steps[cuts[KDTree(centres(cuts)).query(left.points)[1]]], left.heights)
+        np.maximum.at(most, 1 + steps[cuts[nearest_points(KDTree(centres(cuts)), left.points)[1]]], left.heights)
         around = np.max([most[:-2], most[1:-1], most[2:]], axis=0)[steps[rows]]
         heights = np.where(np.isfinite(around), around, heights)
     return np.asarray(heights, dtype=np.float64)

@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 from pentapod.base.arrays import Floats, Ints
 from pentapod.base.errors import ToolpathError
 from pentapod.geometry.directions import angle_between, normalised, partway
+from pentapod.numerics.threads import nearest_points
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ def _weights(points: Floats, axes: Floats, reach: float, options: AxisSmoothingO
     cubes = np.floor(points / (options.thinned * reach)).astype(np.int64)
     chosen = np.sort(np.unique(cubes, axis=0, return_index=True)[1])
     count = min(options.neighbours, len(chosen))
-    found = KDTree(points[chosen]).query(points, k=count, distance_upper_bound=reach)
+    found = nearest_points(KDTree(points[chosen]), points, k=count, distance_upper_bound=reach)
     distance, index = np.asarray(found[0]).reshape(len(points), -1), np.asarray(found[1]).reshape(len(points), -1)
     known = np.isfinite(distance)
     row = np.broadcast_to(np.arange(len(points))[:, None], distance.shape)[known]

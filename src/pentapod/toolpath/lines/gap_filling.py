@@ -18,6 +18,7 @@ from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.slicing import LevelSet
 from pentapod.mesh.topology import components
+from pentapod.numerics.threads import nearest_points
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ def _covering(points: Floats, tip: int, reach: float) -> slice | None:
     sides = [slice(0, tip + 1), slice(tip, len(points))]
     sides.sort(key=lambda side: float(np.linalg.norm(np.diff(points[side], axis=0), axis=1).sum()))
     for kept, left in (sides, sides[::-1]):
-        if KDTree(points[kept]).query(points[left])[0].max() <= reach:
+        if nearest_points(KDTree(points[kept]), points[left])[0].max() <= reach:
             return kept
     return None
 
@@ -182,7 +183,7 @@ def _needed(patch: Patch, in_gap: Bools, lines: Passes, negligible: float) -> Bo
     np.add.at(area, patch.faces.ravel(), np.repeat(patch.areas / 3.0, 3))
     if not in_gap.any() or not len(lines):
         return np.zeros(len(lines), dtype=np.bool_)
-    nearest = np.asarray(KDTree(lines.points).query(patch.vertices[in_gap])[1])
+    nearest = np.asarray(nearest_points(KDTree(lines.points), patch.vertices[in_gap])[1])
     served = np.bincount(lines.pass_of_point[nearest], weights=area[in_gap], minlength=len(lines))
     order = np.argsort(served, kind="stable")
     needed = np.empty(len(lines), dtype=np.bool_)

@@ -22,6 +22,7 @@ from pentapod.mesh.normals import corner_angles, unit_or_zero
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.topology import components
+from pentapod.numerics.threads import nearest_points
 
 Rising = tuple[Ints, Floats]
 """Sides (S,) of facets at which a patch ends in a corner, and the normals (S, 3) of what rises beyond."""
@@ -163,12 +164,12 @@ def _beyond(tree: KDTree, places: Floats, above: Floats, radius: float) -> Float
     above (N, 3): on the surface that the tree's points lie on. Of a place below it many points are almost equally far,
     and the nearest is found slowly; the point that is nearest to `above` mostly tells that none is left.
     """
-    index = np.asarray(tree.query(above, distance_upper_bound=2.0 * radius)[1])
+    index = np.asarray(nearest_points(tree, above, distance_upper_bound=2.0 * radius)[1])
     there = np.flatnonzero(index < tree.n)
     beyond = np.full(len(places), np.inf)
     beyond[there] = np.linalg.norm(places[there] - tree.data[index[there]], axis=1) - radius
     doubtful = np.flatnonzero(beyond > 0.0)
-    far = np.asarray(tree.query(places[doubtful], distance_upper_bound=2.0 * radius)[0])
+    far = np.asarray(nearest_points(tree, places[doubtful], distance_upper_bound=2.0 * radius)[0])
     beyond[doubtful] = np.minimum(far, 2.0 * radius) - radius
     return np.maximum(beyond, 0.0)
 
@@ -187,7 +188,7 @@ def _about(patch: Patch, wanted: Bools, reach: float) -> Bools:
     if not wanted.any():
         return wanted
     middles = patch.vertices[patch.faces].mean(axis=1)
-    return np.asarray(KDTree(middles[wanted]).query(middles, distance_upper_bound=reach)[0]) < np.inf
+    return np.asarray(nearest_points(KDTree(middles[wanted]), middles, distance_upper_bound=reach)[0]) < np.inf
 
 
 def _spread(patch: Patch, rising: Rising, radius: float) -> Floats:

@@ -16,6 +16,7 @@ from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.normals import unit_or_zero
 from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
+from pentapod.numerics.threads import nearest_points
 from pentapod.toolpath.lines.sharp_edges import edge_chains, other_end, sharp_edges
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.strategy import ContactPaths, Strategy, region_patch
@@ -104,7 +105,7 @@ def _edges_at(points: Floats, mesh: Mesh, edges: Ints, tracing: EdgeTracing) -> 
     owner = np.repeat(np.arange(len(edges)), counts)
     share = (np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)) / (counts - 1)[owner]
     samples = ends[owner, 0] + share[:, None] * (ends[owner, 1] - ends[owner, 0])
-    near = np.asarray(KDTree(samples).query(points, k=min(8, len(owner)))[1]).reshape(len(points), -1)
+    near = np.asarray(nearest_points(KDTree(samples), points, k=min(8, len(owner)))[1]).reshape(len(points), -1)
     candidates = owner[near]
     start, step = ends[candidates, 0], ends[candidates, 1] - ends[candidates, 0]
     offset = points[:, None] - start

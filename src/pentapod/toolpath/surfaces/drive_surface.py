@@ -24,6 +24,7 @@ from pentapod.mesh.passes import Passes
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.tree import FacetTree
 from pentapod.mesh.region import Region
+from pentapod.numerics.threads import nearest_points
 from pentapod.toolpath.options import PathOptions
 from pentapod.toolpath.surfaces.ball_centres import BallCentres, smoothed
 from pentapod.toolpath.surfaces.options import DriveOptions
@@ -249,7 +250,7 @@ def _distance(centres: Floats, points: Floats, most: float) -> Floats:
     """Return how far points (N, 3) are from the nearest of some centres (M, 3); infinite beyond `most` metres."""
     if not len(centres) or not len(points):
         return np.full(len(points), np.inf)
-    return np.asarray(KDTree(centres).query(points, distance_upper_bound=most)[0])
+    return np.asarray(nearest_points(KDTree(centres), points, distance_upper_bound=most)[0])
 
 
 def _window(part: Mesh, radius: float, view: Floats, options: DriveOptions, region: Region) -> Window | None:

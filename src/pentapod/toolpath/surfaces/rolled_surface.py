@@ -20,6 +20,7 @@ from pentapod.mesh.patch import Patch
 from pentapod.mesh.query.heightfield import HeightField
 from pentapod.mesh.region import Region
 from pentapod.mesh.topology import components
+from pentapod.numerics.threads import nearest_points
 from pentapod.toolpath.lines.scallop import surface_steps
 from pentapod.toolpath.options import CoverOptions, PathOptions
 from pentapod.toolpath.surface import Contacts
@@ -235,7 +236,7 @@ class RolledSurface(ABC):
         sides = np.stack([patch.faces, np.roll(patch.faces, -1, axis=1)], axis=-1).reshape(-1, 2)
         longest = np.linalg.norm(patch.vertices[sides[:, 1]] - patch.vertices[sides[:, 0]], axis=1).max(initial=0.0)
         far = longest + 2.0 * self.radius + step
-        near = np.minimum(KDTree(border).query(contacts, distance_upper_bound=far)[0], far)
+        near = np.minimum(nearest_points(KDTree(border), contacts, distance_upper_bound=far)[0], far)
         beyond = np.where((near < step) & (over > step), over, -near)
         # A cutter over a hole smaller than itself is beyond its border, but not far.
         sides = sides[(beyond[sides] > 0.0).all(axis=1)]

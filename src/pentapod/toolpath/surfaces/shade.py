@@ -7,6 +7,7 @@ from scipy.spatial import KDTree
 
 from pentapod.base.arrays import Bools
 from pentapod.mesh.patch import Patch
+from pentapod.numerics.threads import nearest_points
 
 
 def out_of_the_shade(patch: Patch, hidden: Bools, reach: float) -> Patch:
@@ -21,5 +22,5 @@ def out_of_the_shade(patch: Patch, hidden: Bools, reach: float) -> Patch:
     packed = np.ravel_multi_index(tuple(cell.T), tuple((cell.max(axis=0) + 1).tolist()))
     _, first, which = np.unique(packed, return_index=True, return_inverse=True)
     cells, free = cell[first], np.bincount(which[~hidden], minlength=len(first)) > 0
-    near = np.asarray(KDTree(cells[free]).query(cells, p=np.inf, distance_upper_bound=1.5)[0])[which] < np.inf
+    near = np.asarray(nearest_points(KDTree(cells[free]), cells, p=np.inf, distance_upper_bound=1.5)[0])[which] < np.inf
     return patch if near.all() else patch.only(near)

@@ -16,6 +16,7 @@ from pentapod.base.arrays import Bools, Floats
 from pentapod.geometry.runs import distinct
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
+from pentapod.numerics.threads import nearest_points
 from pentapod.toolpath.surfaces.options import UnreachedOptions
 
 
@@ -40,12 +41,12 @@ def nearest_to_unreached(
     away = np.full(len(points), np.inf)
     wide = ~patch.topology.small_bodies(patch.vertices, options.fragment * radius)
     if wide.any():
-        away = np.asarray(KDTree(patch.vertices[distinct(patch.faces[wide])]).query(points)[0])
+        away = np.asarray(nearest_points(KDTree(patch.vertices[distinct(patch.faces[wide])]), points)[0])
     least = options.nearer * radius
     missed = np.flatnonzero(away > radius + least)
     missed = missed[~covers(points[missed])]
     if len(missed):
         places = np.flatnonzero(machined())
-        near, which = (np.asarray(found) for found in KDTree(mesh.vertices[places]).query(points[missed]))
+        near, which = (np.asarray(found) for found in nearest_points(KDTree(mesh.vertices[places]), points[missed]))
         wanted[places[which[near < away[missed] - least]]] = True
     return Patch.whole(mesh).only(np.asarray(wanted[mesh.faces].any(axis=1)))

@@ -17,6 +17,7 @@ from scipy.spatial import KDTree
 from pentapod.base.arrays import Bools, Floats
 from pentapod.geometry.solids import Solid
 from pentapod.mesh.query.heightfield import HeightField
+from pentapod.numerics.threads import nearest_points
 from pentapod.verify.replay.along_toolpath import Motion
 from pentapod.verify.surface.reachable import body_reaches, nearest_centres
 from pentapod.verify.verdict.coverage import Coverage
@@ -119,7 +120,7 @@ class LimitSurface:
         tip stays above the lowest point of the part, below which is what the part stands on. Nothing is known of its
         normals: those of the part stand for them.
         """
-        axes = motion.axes[np.asarray(KDTree(motion.tilt_centres[:]).query(points)[1])]
+        axes = motion.axes[np.asarray(nearest_points(KDTree(motion.tilt_centres[:]), points)[1])]
         ways, lowest = (axes, normals), -np.inf
         if coverage.one_direction and _keeps_its_axis(motion):
             ways, lowest = (axes,), float((cutting.surface.mesh.vertices @ axes[0]).min())

@@ -17,6 +17,7 @@ from pentapod.geometry.directions import normalised
 from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.patch import Patch
 from pentapod.mesh.region import Region
+from pentapod.numerics.threads import nearest_points
 from pentapod.toolpath.lines.scallop import scallop_height
 from pentapod.toolpath.linking.partition import Piece, cutting_intervals
 from pentapod.toolpath.options import CoverOptions, PathOptions
@@ -136,7 +137,7 @@ class Coverage(Value):
         share = ((number + 0.5) / counts[owner])[:, None]
         fine = self.region.refined(size)
         middles = fine.vertices[fine.faces].mean(axis=1) + max(whole.tilt_centre, 0.0) * fine.facet_normals
-        nearest = KDTree(start[owner] + share * (end - start)[owner]).query(middles)[1]
+        nearest = nearest_points(KDTree(start[owner] + share * (end - start)[owner]), middles)[1]
         own = mine[cutting[owner[np.asarray(nearest)]]]
         return replace(self, region=Patch(fine.vertices, fine.faces[own], fine.normals[own]))
 
