@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+import zlib
 from typing import Any
 
 import numpy as np
@@ -60,7 +61,7 @@ class Packed:
         """Add a mesh in the order that packs best; vertices (V, 3) in mm, faces (F, 3)."""
         orders = [np.arange(len(faces)), _along_curve(vertices, faces)]
         tried = [by_first_use(vertices, faces[order]) for order in orders]
-        sizes = [len(_of_mesh(*mesh).block) for mesh in tried]
+        sizes = [_of_mesh(*mesh).rough_size for mesh in tried]
         places, corners = tried[int(np.argmin(sizes))]
         self.numbers(f"{name}.vertices", places, MESH_STEP_MM)
         self.whole(f"{name}.faces", corners)
@@ -75,6 +76,11 @@ class Packed:
         place = {"at": len(self._bytes), "rows": len(whole), "columns": whole.shape[1], "size": size}
         self.directory[name] = {**place, **scale}
         self._bytes += planes.tobytes()
+
+    @property
+    def rough_size(self) -> int:
+        """Bytes of the arrays with quick compression, to compare orders by: it takes an eighth of the time."""
+        return len(zlib.compress(bytes(self._bytes), 1))
 
     @property
     def block(self) -> str:
