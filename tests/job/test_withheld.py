@@ -73,7 +73,8 @@ def test_a_plan_for_advice_is_not_made_where_its_toolpath_leaves_too_much(tmp_pa
     stages: set[str] = set()
     job = Job.load(tmp_path / "job.toml").with_(tolerance={"left_mm": 0.05})
     ended = tried(job, lambda stage, *_: stages.add(stage), left_first=True)
-    assert ended == Tried("verdict", failed=frozenset((SURFACE_LEFT,)))
+    assert ended == Tried("verdict", failed=frozenset((SURFACE_LEFT,)), left=ended.left)
+    assert 50.0 < ended.left < 100.0
     assert "toolpath" in stages
     assert "placement" not in stages
 

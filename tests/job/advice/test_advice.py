@@ -163,6 +163,30 @@ def test_axes_that_leave_too_much_are_not_tried_at_other_places(known, tmp_path)
 
 
 @pytest.mark.usefixtures("all_fits")
+@pytest.mark.parametrize("least", [3.0, 9.0])
+def test_what_a_plan_leaves_may_stay_where_nothing_else_passes(least, tmp_path):
+    """Of plans that fail in that alone, the one that keeps most is made again, once all others have failed."""
+
+    def plan(job: Job, _) -> Tried:
+        planned.append(job)
+        return Tried(None if job.tolerance.left_share > 0.001 else "placement", 0.1, LEFT_ALONE, (), left[len(planned)])
+
+    planned: list[Job] = []
+    left = [0.0, 40.0, least + 1.0, least, 20.0, least]
+    job = Job.load(REFUSED["table too low"].write(tmp_path)).with_(tolerance={"left_share": 0.001})
+    found = advised(job, job_machine(job), job_mesh(job), None, plan, AdviceOptions(plans=4), silent)
+    if least == 9.0:  # a tenth of the region is too much to stay
+        assert not found.advice
+        assert len(planned) == 4
+    else:
+        (advice,) = found.advice
+        assert advice.kept == pytest.approx(0.964)
+        assert "at most 3.6 % of the region stays" in str(advice)
+        assert [each.tolerance.left_share for each in planned] == [0.001] * 4 + [0.036]
+        assert planned[4].with_(tolerance={"left_share": 0.001}).tables == planned[2].tables
+
+
+@pytest.mark.usefixtures("all_fits")
 @pytest.mark.parametrize(("leaves", "share"), [(0.009, 0.011), (None, None)])
 def test_that_the_few_places_out_of_limits_are_left_out_is_planned_first_and_besides_all_else(leaves, share, tmp_path):
     def plan(job: Job, _) -> Tried:

@@ -72,12 +72,12 @@ class FailedClaims:
         else:
             yield from self._as_left()
         if self.leaves is not None:
-            yield self._staying(_longer(self.options.more * self.leaves))
+            yield self._told(staying(longer(self.options.more * self.leaves)))
 
     def at_last(self) -> Iterator[Trial]:
         """Yield the program as it is where nothing else was found, and more than a little is left."""
         if self.options.little < self._accepted <= self.options.largest:
-            yield self._staying(self._accepted)
+            yield self._told(staying(self._accepted))
 
     def upright(self) -> Iterator[Trial]:
         """Yield the job without what a ball reaches only under an overhang, where the tool touches the part."""
@@ -159,13 +159,11 @@ class FailedClaims:
         """Yield the program as it is, where nothing but a little that is left on the surface stands against it."""
         share = self._accepted
         if share <= self.options.little:
-            yield self._staying(share)
+            yield self._told(staying(share))
 
-    def _staying(self, share: float) -> Trial:
-        """Return the change by which a share of the region may stay as it is."""
-        words = f"at most {100.0 * share:.3g} % of the region stays as it is"
-        self.tell(words)
-        return Trial(words, {"tolerance": {"left_share": share}}, 1.0 - share, 1.0 - share)
+    def _told(self, trial: Trial) -> Trial:
+        self.tell(trial.words)
+        return trial
 
     @property
     def _accepted(self) -> float:
@@ -174,7 +172,7 @@ class FailedClaims:
         left = min((each for each in (own, self.left) if each is not None), default=0.0)
         if own is not None and own <= self.options.about * left:  # judged on its program; another way is planned again
             left = own
-        return _longer(1e-2 * self.options.more * left) if left > 0.0 else np.inf
+        return longer(1e-2 * self.options.more * left) if left > 0.0 else np.inf
 
     def _finer(self) -> Iterator[tuple[str, Changes, float]]:
         """Yield waterlines on walls, passes nearer together with the same bound of what is left, a smaller cutter.
@@ -281,7 +279,13 @@ def _cut_length(toolpath: Toolpath) -> float:
     return float(steps[kinds].sum())
 
 
-def _longer(share: float) -> float:
+def staying(share: float) -> Trial:
+    """Return the change by which a share of the region may stay as it is."""
+    words = f"at most {100.0 * share:.3g} % of the region stays as it is"
+    return Trial(words, {"tolerance": {"left_share": share}}, 1.0 - share, 1.0 - share)
+
+
+def longer(share: float) -> float:
     """Return a share with two digits, rounded up."""
     size = 10.0 ** (np.floor(np.log10(max(share, 1e-6))) - 1.0)
     return float(f"{np.ceil(share / size) * size:.2g}")

@@ -16,12 +16,14 @@ class Tried(NamedTuple):
 
     failed: names of the claims that fail, of the other way in which it was planned where there is one. meets: heights
     as of `met_below`, where nothing but the tool or the spindle that touches the part stood against its placement.
+    left: percent of the region that it leaves, where that is all that fails.
     """
 
     stage: str | None
     margin: float | None = None
     failed: frozenset[str] = frozenset()
     meets: tuple[float, ...] = ()
+    left: float | None = None
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from pentapod.base.errors import InputError
 from pentapod.base.progress import Progress
 from pentapod.base.refusal import Advice, Change, Shortfall
 from pentapod.base.values import Value
-from pentapod.job.advice.failed_claims import FailedClaims
+from pentapod.job.advice.failed_claims import FailedClaims, longer, staying
 from pentapod.job.advice.options import FEWEST, AdviceOptions, Tried
 from pentapod.job.advice.settings import LEFT_ALONE, TOUCHES, Settings, Tell, Trial, joined, merged, met_below
 from pentapod.job.advice.sketch import Sketch
@@ -97,6 +97,7 @@ def advised(
     # A plan that goes back for another way is two.
     count, interrupted = (options.replans if failed or otherwise else options.plans) + (leaves is not None), False
     ended: list[Tried | None] = [None]
+    leaving: list[Trial] = []
     shown = _Shown(progress, count)
     progress("advice", 0.0, "changes of the job are tried; Ctrl-C ends the search")
 
@@ -122,19 +123,32 @@ def advised(
         first = claims.upright() if upright else claims.reaching() if forbidden else ()
         trials, at_last = chain(first, claims.all(), trials), claims.at_last()
     try:
-        for number, trial in enumerate(chain(islice(trials, count), at_last)):
+        for number, trial in enumerate(chain(islice(trials, count), at_last, _keeping_most(leaving))):
             tried[trial.words] = None
             ended.append(plan := _ended(planned, job, trial, partial(shown.plan, number, trial.words)))
             shown.number = number + 1
             if plan.stage is None:
                 changes = (Change(table, *item) for table, keys in trial.changes.items() for item in keys.items())
                 found.append(Advice(tuple(changes), trial.words, trial.kept, trial.whole, plan.margin))
+            elif plan.left and (share := longer(1e-2 * options.more * plan.left)) <= options.largest:
+                leaving.append(_and(trial, staying(share)))
             if len(found) == options.wanted:
                 break
     except KeyboardInterrupt:
         interrupted = True
         progress("advice", 1.0, "interrupted: what was found is kept")
     return Advised(tuple(found), tuple(tried), interrupted, tuple(reasons))
+
+
+def _keeping_most(trials: list[Trial]) -> Iterator[Trial]:
+    """Yield the trial that keeps most, once it is asked for; none where the list is empty."""
+    yield from sorted(trials, key=lambda trial: -trial.kept)[:1]
+
+
+def _and(first: Trial, more: Trial) -> Trial:
+    """Return a trial with the changes of another one, too."""
+    words, changes = joined(first.words, more.words), merged(first.changes, more.changes)
+    return replace(first, words=words, changes=changes, kept=first.kept * more.kept)
 
 
 @dataclass

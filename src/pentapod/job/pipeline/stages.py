@@ -171,8 +171,8 @@ def tried_of(outcome: Outcome) -> Tried:
     refusal, way, meets = outcome.refusal, outcome.find(FailedWay), tuple[float, ...]()
     if refusal is not None and refusal.stage == "placement":
         meets = met_below(outcome.job, outcome.find(Mesh), outcome.find(Toolpath), refusal.diagnosis, OPTIONS)
-    stage = "verdict" if refusal is None else refusal.stage
-    return Tried(stage, failed=frozenset(failures(outcome.verdict)) if way is None else way.claims, meets=meets)
+    stage, way = "verdict" if refusal is None else refusal.stage, way or FailedWay.of(outcome)
+    return Tried(stage, failed=way.claims, meets=meets, left=way.left)
 
 
 def _split(attempt: Attempt, refusal: Refusal) -> Outcome:
