@@ -9,6 +9,7 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.geometry.directions import angle_between
 from pentapod.geometry.polyline import arc_length
+from pentapod.numerics.blocks import blocks
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,8 @@ class FreeSpaceOptions:
 
     cells: that one search may look at, of five bytes each; a million take about a second. rounds, window: of the
     search that widens the radius where the motion leaves the path: how often, and how many samples at first. In all
-    these rounds it may look at `widened` cells, and `each` more for each sample.
+    these rounds it may look at `widened` cells, and `each` more for each sample. at_once: samples that are measured
+    together.
     """
 
     cells: int = 150_000_000
@@ -25,6 +27,7 @@ class FreeSpaceOptions:
     each: int = 16
     rounds: int = 40
     window: int = 32
+    at_once: int = 1 << 15
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,13 +97,17 @@ class FreeSpace:
         Without those where axes have a weight: there the nearest place is not the best one.
         """
         chord = np.minimum(pairing.times.astype(np.intp), len(self._deviations) - 1)
-        at_samples = np.append(self._deviations, 0.0)
-        np.maximum(at_samples[1:], self._deviations, out=at_samples[1:])
-        at_samples += distances
-        samples, waypoints = self._weights[0][pairing.intervals] == 0.0, self._weights[1] == 0.0
-        samples[[0, -1]] = waypoints[[0, -1]] = True
-        of_waypoints = (waypoint_distances + self._deviations[chord])[waypoints]
-        return float(max(at_samples.max(where=samples, initial=-np.inf), of_waypoints.max()))
+        weighs, waypoints = self._weights[0] != 0.0, self._weights[1] == 0.0
+        waypoints[[0, -1]] = True
+        most = float((waypoint_distances + self._deviations[chord])[waypoints].max())
+        last = len(distances) - 1
+        for part in blocks(len(distances), self._options.at_once):
+            rows = np.arange(part.start, part.stop)
+            beside = self._deviations[np.maximum(rows - 1, 0)], self._deviations[np.minimum(rows, last - 1)]
+            counts = ~weighs[pairing.intervals[part]] | (rows == 0) | (rows == last)
+            at_samples = np.maximum(*beside) + distances[part]
+            most = max(most, float(at_samples.max(where=counts, initial=-np.inf)))
+        return most
 
     def patched(self, radius: float) -> Pairing | None:
         """Return a matching within the radius, which is widened where the motion leaves the path.

@@ -121,30 +121,30 @@ def match(
         return _measure(motion, path, pairing, _places(motion, path, turning, tolerance, pairing, options), options)
 
     for radius, by_axis in ((within, True), (within, False), (wide, False)):
-        pairing = space.pairing(radius, by_axis=by_axis)
-        if pairing is not None:
-            return _least(space, pairing, measured, radius, by_axis=by_axis, precision=options.precision)
+        found = _least(space, measured, radius, by_axis=by_axis, precision=options.precision)
+        if found is not None:
+            return found
     return measured(space.patched(wide) or space.by_arc_length())
 
 
 def _least(
-    space: FreeSpace,
-    pairing: Pairing,
-    measured: Callable[[Pairing], PathMatch],
-    radius: float,
-    *,
-    by_axis: bool,
-    precision: float,
-) -> PathMatch:
-    """Return the matching with the smallest largest distance by bisection, from a pairing within a radius, metres."""
+    space: FreeSpace, measured: Callable[[Pairing], PathMatch], radius: float, *, by_axis: bool, precision: float
+) -> PathMatch | None:
+    """Return the matching within a radius, metres, with the smallest largest distance, by bisection; None without one.
+
+    Of a long program a pairing takes much memory, so none is kept.
+    """
 
     def largest(pairing: Pairing, match: PathMatch) -> float:
         return space.largest(pairing, match.distances, match.waypoint_distances)
 
-    best = measured(pairing)
-    low, high = pairing.least, largest(pairing, best)
+    if (found := space.pairing(radius, by_axis=by_axis)) is None:
+        return None
+    best = measured(found)
+    low, high = found.least, largest(found, best)
     trial = low * (1.0 + precision)
     while high > low * (1.0 + precision) and high > precision * radius:
+        del found
         found = space.pairing(trial, by_axis=by_axis, more=radius - trial)
         if found is None:
             low = trial
