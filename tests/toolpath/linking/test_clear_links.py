@@ -25,6 +25,7 @@ from pentapod.toolpath import (
     Mesh,
     OffsetOptions,
     Orientation,
+    PencilOptions,
     RasterOptions,
     Remedy,
     Segment,
@@ -175,6 +176,7 @@ WAYS = {
     "offset": lambda **more: OffsetOptions(stepover=5e-3, **more),
     "spiral": lambda **more: SpiralOptions(stepover=5e-3, **more),
     "edges": EdgeOptions,
+    "pencil": PencilOptions,
     "text": lambda **more: TextOptions(text="AB", height=0.02, **more),
 }
 
@@ -201,7 +203,7 @@ def links_of_part(mesh, direction, seed):
         options = options_of(region=Region(direction=direction, angle=np.radians(80.0)))
         try:
             path = make_toolpath(mesh, tool, options)
-        except ToolpathError:  # no waterline on a flat part, no edge on a smooth one
+        except ToolpathError:  # no waterline on a flat part, no edge or corner on a smooth one, no pencil but a ball
             continue
         path = stepped(oriented(path, tool, Orientation(mode=mode)), options.axis_step)
         top = max(float((mesh.vertices @ view).max()), float((path.tips @ view).max()))
