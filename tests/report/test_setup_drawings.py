@@ -125,7 +125,7 @@ def test_setup_labels_are_apart_wherever_the_part_is(standing, shift, tilt):
 
 @pytest.mark.slow
 def test_a_part_that_is_moved_is_drawn_where_it_stands_now(standing):
-    """Outlines of a mesh are remembered: each place has its own."""
+    """Drawings are remembered: each place has its own."""
     runs = [standing("desk", (5.0, 0.0, 0.0), *turned) for turned in ((0.0, 0.0), (44.0, 0.0), (44.0, 20.0))]
     shared = runs[0].mesh
     for run in (*runs, runs[0]):

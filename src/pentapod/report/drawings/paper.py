@@ -160,9 +160,14 @@ class Paper:
 
         Returns its box.
         """
-        boxes = [box_of(place, text) for place in places]
-        best = min(range(len(boxes)), key=lambda k: self._hidden(boxes[k]))
-        (x, y, anchor), box = places[best], boxes[best]
+        least = np.inf
+        (x, y, anchor), box = places[0], box_of(places[0], text)
+        for place in places:
+            here = box_of(place, text)
+            if (hidden := self._hidden(here)) < least:
+                least, (x, y, anchor), box = hidden, place, here
+            if least == 0.0:
+                break
         self.keep(box)
         self.parts.append(
             f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}" font-size="{LETTER:g}" text-anchor="{anchor}" '

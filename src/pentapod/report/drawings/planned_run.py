@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -28,6 +29,9 @@ from pentapod.toolpath.toolpath import Toolpath
 
 UPRIGHT = 5e-5
 """Radians up to which a part counts as not tilted."""
+
+_RUNS: WeakKeyDictionary[PlacedPath, tuple[tuple[Any, ...], PlannedRun]] = WeakKeyDictionary()
+"""The run of each placed path that is in use, with the other things of its outcome."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,19 +84,24 @@ class PlannedRun(Value):
     clock: tuple[Floats, Floats] | None = None
     margin: float | None = None
 
-    @classmethod
-    def of(cls, outcome: Outcome) -> Self | None:
-        """Return the run of an outcome; None where its part has no place."""
+    @staticmethod
+    def of(outcome: Outcome) -> PlannedRun | None:
+        """Return the run of an outcome; None where its part has no place. Of the same outcome it is the same."""
         placed, mesh, toolpath = outcome.find(PlacedPath), outcome.find(Mesh), outcome.find(Toolpath)
         if placed is None or mesh is None or toolpath is None:
             return None
-        law = outcome.find(Trajectory)
+        law, program = outcome.find(Trajectory), outcome.find(Program)
         job, machine = outcome.job, outcome.machine
-        return cls(
-            job, machine, mesh, job_tool(job, machine), toolpath, placed.placement.transform, placed.tips, placed.axes,
-            outcome.find(Program), None if law is None else (law.profile.times, law.profile.stations),
-            placed.smallest_margin,
-        )  # fmt: skip
+        about = (job, machine, mesh, toolpath, program)
+        known, run = _RUNS.get(placed, ((), None))
+        if run is None or any(one is not other for one, other in zip(about, known, strict=True)):
+            run = PlannedRun(
+                job, machine, mesh, job_tool(job, machine), toolpath, placed.placement.transform, placed.tips,
+                placed.axes, program, None if law is None else (law.profile.times, law.profile.stations),
+                placed.smallest_margin,
+            )  # fmt: skip
+            _RUNS[placed] = about, run
+        return run
 
     @property
     def hangs(self) -> bool:

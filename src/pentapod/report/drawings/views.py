@@ -11,7 +11,6 @@ import numpy as np
 from pentapod.base.arrays import Floats, Ints
 from pentapod.machine.leg_ends import arms_beside, base_rim, leg_ends, line_top, rails, strut_ends
 from pentapod.machine.machine import Machine
-from pentapod.mesh.mesh import Mesh
 from pentapod.mesh.topology import Topology
 from pentapod.report.drawings.colours import HELD_COLOUR, LIMIT_COLOUR, QUIET_COLOUR, leg_colour
 from pentapod.report.drawings.outline import Outline, outline_of
@@ -35,10 +34,8 @@ PART = Rooms(22.0, 14.0, 76.0, 48.0)
 """Room around the part by itself."""
 
 
-MOST_OUTLINES = 8
-"""Outlines of a mesh that are remembered."""
-
-_OUTLINES: WeakKeyDictionary[Mesh, dict[bytes, Outline]] = WeakKeyDictionary()
+_DRAWN: WeakKeyDictionary[PlannedRun, dict[tuple[int, ...], str]] = WeakKeyDictionary()
+"""Drawings of the runs that are in use, by the waypoints to touch off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,27 +102,20 @@ def setup_drawings(run: PlannedRun, points: Sequence[TouchOff]) -> str:
     """Return four drawings as SVG in <figure>s: machine from above and from the front, part from above and the side.
 
     The part from the side is seen along its lean, where it is tilted. Letters have the size of the page's captions
-    where a drawing is 350 CSS pixels wide. points: to touch off.
+    where a drawing is 350 CSS pixels wide. points: to touch off. They are remembered: report and sheet show the same.
     """
-    above, front, side = _from_above(run.hangs), _from_front(run.hangs), _along_lean(run)
-    part_above, part_front, part_side = (_outline(run, view) for view in (above, front, side))
-    return (
-        _in_machine(run, above, part_above)
-        + _in_machine(run, front, part_front)
-        + _part(run, above, part_above, points)
-        + _part(run, side, part_side, points)
-    )
-
-
-def _outline(run: PlannedRun, view: View) -> Outline:
-    """Return the outline of a run's part in a view. The last few are remembered: report and sheet draw the same."""
-    place = run.placement
-    key = np.concatenate([view.right, view.up, place.rotation.ravel(), place.translation]).tobytes()
-    known = _OUTLINES.setdefault(run.mesh, {})
+    known, key = _DRAWN.setdefault(run, {}), tuple(point.waypoint for point in points)
     if key not in known:
-        if len(known) >= MOST_OUTLINES:
-            known.clear()
-        known[key] = view.seen(run.vertices, run.mesh.topology)
+        above, front, side = _from_above(run.hangs), _from_front(run.hangs), _along_lean(run)
+        part_above, part_front, part_side = (
+            view.seen(run.vertices, run.mesh.topology) for view in (above, front, side)
+        )
+        known[key] = (
+            _in_machine(run, above, part_above)
+            + _in_machine(run, front, part_front)
+            + _part(run, above, part_above, points)
+            + _part(run, side, part_side, points)
+        )
     return known[key]
 
 
