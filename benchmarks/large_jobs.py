@@ -16,28 +16,12 @@ from pathlib import Path
 
 import numpy as np
 from drop_cutter import jittered_sheet
+from parts_by_others import PLAIN
 from pipeline import ROOT, finer_dome, in_child
 
 from pentapod.toolpath import write_stl
 
-SCAN = """\
-[part]
-mesh = "scan.stl"
-unit = "mm"
-
-[machine]
-name = "desk"
-
-[tool]
-type = "ball"
-diameter_mm = 6
-
-[toolpath]
-stepover_mm = 3
-
-[feed]
-cut_mm_min = 1500
-
+PLACED = """
 [placement]
 mode = "table"
 table_z_mm = 450
@@ -50,7 +34,7 @@ def scan(folder: Path, facets: int) -> Path:
     noise = np.random.default_rng(1).normal(0.0, 20e-6, len(sheet.vertices))
     vertices = sheet.vertices + noise[:, None] * [0.0, 0.0, 1.0]
     (folder / "scan.stl").write_bytes(write_stl(1e3 * vertices[sheet.faces], "scan"))
-    (folder / "scan.toml").write_text(SCAN, encoding="utf-8")
+    (folder / "scan.toml").write_text(PLAIN.format(mesh="scan.stl") + PLACED, encoding="utf-8")
     return folder / "scan.toml"
 
 

@@ -82,7 +82,7 @@ def test_a_search_of_another_version_begins_anew(design_file, tmp_path, caplog):
     before = json.loads((tmp_path / "search.json").read_text(encoding="utf-8"))
     (tmp_path / "search.json").write_text(json.dumps(before | {"versions": {"pentapod": "0.0.1"}}), encoding="utf-8")
     members._check_folder(file, tmp_path)
-    assert "it begins anew" in caplog.text
+    assert "the search begins anew" in caplog.text
     assert not (tmp_path / "designs.bin").exists()
     assert json.loads((tmp_path / "search.json").read_text(encoding="utf-8")) == before
 
@@ -178,6 +178,15 @@ def test_command_says_that_nothing_holds_and_refuses_another_folder(narrow, tmp_
     narrow.write_text(text.replace("seed", "seed") + "seed = 2\n", encoding="utf-8")
     assert run(["design", str(narrow), "-o", str(out), "-j", "1"]) == 2
     assert "the folder holds another search" in capsys.readouterr().err
+
+
+def test_an_interrupted_search_says_that_the_command_goes_on(design_file, tmp_path, monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(members, "design_machines", interrupted)
+    assert run(["design", str(design_file()), "-o", str(tmp_path / "out"), "-q"]) == 130
+    assert f"what is done is in {tmp_path / 'out'}: the same command goes on" in capsys.readouterr().err
 
 
 def test_missing_pymoo_is_an_error_that_says_what_to_install(design_file, tmp_path, monkeypatch):

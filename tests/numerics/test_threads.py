@@ -4,12 +4,24 @@ import os
 import threading
 import time
 from multiprocessing import get_context
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from pentapod.numerics.kernels import kernels_pay, kernels_used
-from pentapod.numerics.threads import CORES, ROWS, both, cores, for_rows, in_threads, on_all_cores
+from pentapod.numerics.threads import (
+    CORES,
+    MANY_POINTS,
+    ROWS,
+    both,
+    cores,
+    for_rows,
+    in_threads,
+    nearest_points,
+    on_all_cores,
+)
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5, None])
@@ -120,6 +132,19 @@ def test_an_error_in_this_thread_or_a_helper_ends_the_work(monkeypatch):
             on_all_cores(fails, range(1000))
         assert len(begun) < 1000
         assert on_all_cores(lambda k: k, range(3)) == [0, 1, 2]
+
+
+@pytest.mark.parametrize("count", [MANY_POINTS, MANY_POINTS + 1])
+def test_nearest_points_are_the_same_on_all_cores_which_many_points_use(count, monkeypatch):
+    rng, asked = np.random.default_rng(3), []
+    tree, points = KDTree(rng.random((4000, 3))), rng.random((count, 3))
+    expected = tree.query(points, k=3, distance_upper_bound=0.05)
+    for number in ("1", "3"):
+        monkeypatch.setenv(CORES, number)
+        found = nearest_points(tree, points, k=3, distance_upper_bound=0.05)
+        assert all((a == b).all() for a, b in zip(found, expected, strict=True))
+        nearest_points(SimpleNamespace(query=lambda *_, workers: asked.append(workers)), points)
+    assert asked == [1, 3 if count > MANY_POINTS else 1]
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from dataclasses import replace
 from html import unescape
 from importlib.resources import files
 from pathlib import Path
@@ -18,6 +19,8 @@ from pentapod.job import Job, run
 from pentapod.planning import PlacedPath
 from pentapod.program import Program
 from pentapod.report.drawings.planned_run import PlannedRun
+from pentapod.report.drawings.touch_off import touch_off_points
+from pentapod.report.drawings.views import setup_drawings
 from pentapod.report.sheet import write_sheet
 from pentapod.timing import Trajectory
 from pentapod.toolpath import SegmentKind
@@ -94,6 +97,17 @@ def test_sheet_tells_tool_part_poses_and_program(planned, sheet):
     assert "Verdict: passed" in words
     assert words.count("touch-off") >= 3
     assert len(re.findall('type="checkbox"', sheet)) >= 7
+
+
+def test_a_run_and_its_drawings_are_remembered_with_all_that_they_show(planned):
+    _, outcome = planned
+    shown = PlannedRun.of(outcome)
+    assert PlannedRun.of(outcome) is shown
+    slower = replace(outcome, job=outcome.job.with_(feed={"cut_mm_min": 700}))
+    assert PlannedRun.of(slower).job.feed.cut_mm_min == 700
+    points = touch_off_points(shown)
+    assert setup_drawings(shown, points) is setup_drawings(shown, points)
+    assert setup_drawings(shown, points[:1]) != setup_drawings(shown, points)
 
 
 def test_sheet_times_add_up_to_the_program(planned):

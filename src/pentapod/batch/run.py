@@ -56,12 +56,12 @@ class Batch(Iterator[Done]):
             store = engine.store
             tasks = given.tasks(store) if isinstance(given, Sweep) else [job_task(job, store) for job in given]
             rows: dict[str, Row] = {}
-            given_again = Counter(task.name for task in tasks)
+            times = Counter(task.name for task in tasks)
             try:
                 for done in engine.run(tasks):
                     rows[done.task.name] = done.columns
                     yield done
-                    for _ in range(1, given_again[done.task.name]):
+                    for _ in range(1, times[done.task.name]):
                         yield replace(done, new=False, seconds=0.0)
             finally:
                 if rows:
@@ -79,10 +79,10 @@ def batch(
 ) -> Batch:
     """Plan and verify jobs on many workers, and yield each with its row when it is done.
 
-    Those that were done before come first; a job that is given twice is planned once and comes twice, in one row of the
-    tables. jobs: as values or files, or a `Sweep`. out: folder; each job has one in it,
-    by its name and the hash of all that it depends on, and is not run again if that is there. workers: processes on
-    this machine, one for each core if None; scheduler: address of a Dask scheduler, "tcp://host:8786", instead.
+    Those that were done before come first. A job that is given twice is planned once, and yielded twice. jobs: as
+    values or files, or a `Sweep`. out: folder; each job has one in it, by its name and the hash of all that it depends
+    on, and is not run again if that is there. workers: processes on this machine, one for each core if None; scheduler:
+    address of a Dask scheduler, "tcp://host:8786", instead.
     parquet: a third table, in Parquet. In a script of your own, call it below `if __name__ == "__main__":`, since
     workers import the script. Raises InputError for a bad job, before any is run, where Dask is not installed, and
     where another batch is writing into the folder.

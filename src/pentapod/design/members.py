@@ -120,7 +120,9 @@ def _check_folder(file: DesignFile, folder: Path) -> None:
             )
         if before.get("versions") == versions():
             return
-        _log.warning("the folder holds the search of another version of pentapod, or of a library: it begins anew")
+        _log.warning(
+            "the folder holds evaluations of another version of pentapod or of a library: the search begins anew"
+        )
         (folder / DESIGNS).unlink(missing_ok=True)
     with atomic_write(place) as temporary:
         temporary.write_text(json.dumps({"digest": digest, "versions": versions()}), encoding="utf-8")

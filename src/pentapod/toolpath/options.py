@@ -52,8 +52,8 @@ class PathOptions(Value):
         float | None,
         Key(
             "mm",
-            "largest distance between passes for a link on the surface; when left out 3 stepovers, or 4 heights of "
-            "approach if that is more and the tool stands off",
+            "largest distance between passes for a link on the surface; when left out: 3 stepovers, and for a tool "
+            "that stands off at least 4 times approach_mm",
             ge=0.0,
         ),
     ] = None

@@ -167,14 +167,20 @@ def test_axes_that_leave_too_much_are_not_tried_at_other_places(known, tmp_path)
 def test_what_a_plan_leaves_may_stay_where_nothing_else_passes(least, tmp_path):
     """Of plans that fail in that alone, the one that keeps most is made again, once all others have failed."""
 
-    def plan(job: Job, _) -> Tried:
+    def plan(job: Job, progress) -> Tried:
         planned.append(job)
+        progress("placement", 0.5)
         return Tried(None if job.tolerance.left_share > 0.001 else "placement", 0.1, LEFT_ALONE, (), left[len(planned)])
 
+    def told(_stage: str, share: float, note: str = "") -> None:
+        assert 0.0 <= share <= 1.0
+        notes.append(note)
+
     planned: list[Job] = []
+    notes: list[str] = []
     left = [0.0, 40.0, least + 1.0, least, 20.0, least]
     job = Job.load(REFUSED["table too low"].write(tmp_path)).with_(tolerance={"left_share": 0.001})
-    found = advised(job, job_machine(job), job_mesh(job), None, plan, AdviceOptions(plans=4), silent)
+    found = advised(job, job_machine(job), job_mesh(job), None, plan, AdviceOptions(plans=4), told)
     if least == 9.0:  # a tenth of the region is too much to stay
         assert not found.advice
         assert len(planned) == 4
@@ -184,6 +190,7 @@ def test_what_a_plan_leaves_may_stay_where_nothing_else_passes(least, tmp_path):
         assert "at most 3.6 % of the region stays" in str(advice)
         assert [each.tolerance.left_share for each in planned] == [0.001] * 4 + [0.036]
         assert planned[4].with_(tolerance={"left_share": 0.001}).tables == planned[2].tables
+        assert any(note.startswith("plan 5 of at most 5: ") for note in notes)
 
 
 @pytest.mark.usefixtures("all_fits")

@@ -12,7 +12,7 @@ from pentapod.base.display import load_extra
 from pentapod.base.errors import InputError
 
 _SETTINGS = {
-    # A worker gets a task when it has none, also where two answers come at once: its death is nobody else's.
+    # A worker gets the next task when it has none, so that its death is nobody else's.
     "distributed.scheduler.worker-saturation": 1.0,
     # The engine runs a task again, and counts; the scheduler shall not.
     "distributed.scheduler.allowed-failures": 0,

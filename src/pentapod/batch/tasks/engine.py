@@ -80,7 +80,8 @@ class Engine:
     """Runs tasks in a folder: `with Engine("runs") as engine: for done in engine.run(tasks): ...`.
 
     Each task has a folder of its name in it, which is there when it is whole. A task whose folder is there is not run.
-    What crashed leaves no folder: it is run again the next time. While the engine is open, no other can be on this
+    What crashed leaves no folder: it is run again the next time. Where no task was begun, a folder that it made is
+    removed. While the engine is open, no other can be on this
     folder. workers: processes on this machine, one for each core if left out; scheduler: address of a running Dask
     scheduler, "tcp://host:8786", instead. Dask is imported, and workers are started, when a task is to be run.
     Raises InputError: the folder cannot be written, or another engine is on it.
@@ -116,7 +117,7 @@ class Engine:
 
     def __exit__(self, *failure: object) -> None:
         self._open.close()
-        if self._made and not self._has_begun:  # a mistake in a file leaves nothing behind
+        if self._made and not self._has_begun:  # a mistake in a job leaves nothing behind
             shutil.rmtree(self.folder, ignore_errors=True)
 
     def run(self, tasks: Sequence[Task]) -> Iterator[Done]:

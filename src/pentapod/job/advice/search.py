@@ -175,7 +175,8 @@ class _Shown:
         begins, ends = STAGES.get(stage, (0.0, 0.0))
         share = begins + (ends - begins) * fraction
         self._tell(
-            ESTIMATES + (1.0 - ESTIMATES) * share, f"plan {number + 1} of at most {self.count}: {words}: {stage}"
+            ESTIMATES + (1.0 - ESTIMATES) * share,
+            f"plan {number + 1} of at most {max(self.count, number + 1)}: {words}: {stage}",
         )
 
     def _tell(self, share: float, words: str) -> None:

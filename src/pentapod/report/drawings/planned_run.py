@@ -92,7 +92,7 @@ class PlannedRun(Value):
             return None
         law, program = outcome.find(Trajectory), outcome.find(Program)
         job, machine = outcome.job, outcome.machine
-        about = (job, machine, mesh, toolpath, program)
+        about = (job, machine, mesh, toolpath, law, program)
         known, run = _RUNS.get(placed, ((), None))
         if run is None or any(one is not other for one, other in zip(about, known, strict=True)):
             run = PlannedRun(

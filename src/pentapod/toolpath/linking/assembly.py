@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pentapod.base.arrays import Floats, Ints
-from pentapod.cutters.stand_off import StandOff
 from pentapod.cutters.tool import Tool
 from pentapod.geometry.directions import tangent_frame
 from pentapod.geometry.runs import run_starts
@@ -69,7 +68,7 @@ def assembled(
     source, passes = source[passes.levels], replace(passes, levels=levels[passes.levels])
     power = np.ones(len(passes)) if paths.power is None else paths.power[source]
     reach = assembly.reach * paths.stepover if options.stay is None else options.stay
-    if isinstance(tool, StandOff) and options.stay is None:
+    if tool.tilt_centre < 0.0 and options.stay is None:  # it stands off
         reach = max(reach, assembly.reach_of_beam * options.approach)
     # A proven link may be of any length, but not back along a pass that is cut one way.
     anywhere = surface.slides and paths.both_ways and options.stay is None

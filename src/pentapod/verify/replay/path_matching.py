@@ -31,14 +31,13 @@ class MatchOptions:
     within: share of the tolerance up to which a matching is within it; claims allow a little more. precision: relative,
     of the smallest largest distance, which is searched for up to `wide` tolerances; beyond, the sum of squares is
     minimised instead. axis_scale: radians; where the path turns on the spot, an axis this far off counts as much as a
-    tilt centre off by the tolerance. at_once: samples that are measured together.
+    tilt centre off by the tolerance.
     """
 
     within: float = 1.0 + 0.999e-3
     precision: float = 1e-3
     wide: float = 4.0
     axis_scale: float = 0.05
-    at_once: int = 1 << 15
     search: FreeSpaceOptions = field(default_factory=FreeSpaceOptions)
 
 
@@ -165,7 +164,7 @@ def _places(
 ) -> Floats:
     """Return the place (M,) of each sample: the closest on its interval that keeps order and radius."""
     places, interval = np.empty(len(motion.points)), pairing.intervals
-    for part in blocks(len(places), options.at_once):
+    for part in blocks(len(places), options.search.at_once):
         own = PosedPolyline(motion.points[part], motion.axes[part])
         places[part] = interval[part] + interval_fractions(own, path, turning, tolerance, interval[part], options)
     return pairing.ordered_places(places)
@@ -185,7 +184,7 @@ def _measure(
     times = pairing.times
     turns = angle_between(path.axes[:-1], path.axes[1:])
     distances, angles = np.empty(len(places)), np.empty(len(places))
-    for part in blocks(len(places), options.at_once):
+    for part in blocks(len(places), options.search.at_once):
         points, axes = pose_at(path, turns, places[part])
         distances[part] = row_lengths(motion.points[part] - points)
         angles[part] = angle_between(motion.axes[part], axes)
